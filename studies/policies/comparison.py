@@ -192,7 +192,7 @@ def comparison_data(n_jobs: int = -1) -> None:
         (case | {"physics": SETTINGS, "weights": weights.get(case["policy"])}, (*case.values(),))
         for case in cases
     ]
-    results = keep_all("comparison", _compared, asked, n_jobs)
+    results = keep_all("comparison", compare, asked, n_jobs)
     tables = {"policies": pd.concat([pd.DataFrame(result.value) for result in results])}
     full = {name: FULL[name] for name in ("episodes", "seed", "max_picks")}
     settings = {"policies": weights, "loads": LOADS, "seed": SEED}
@@ -200,11 +200,7 @@ def comparison_data(n_jobs: int = -1) -> None:
     publish("policies", tables, f"{COMMAND} policies", settings, results)
 
 
-def _compared(*case) -> dict[str, list]:
-    return compare(*case).to_dict("list")
-
-
-def compare(name: str, mask: bool, condition: str) -> pd.DataFrame:
+def compare(name: str, mask: bool, condition: str) -> dict[str, list]:
     """The rows of ``evaluate`` for a policy under a condition.
 
     Returns:
@@ -213,7 +209,7 @@ def compare(name: str, mask: bool, condition: str) -> pd.DataFrame:
     arguments = {"episodes": LOADS, "seed": SEED, "mask": mask} | CONDITIONS[condition]
     table = evaluate(find_policy(name), **arguments)
     named = {"policy": name, "mask": mask, "condition": condition, "load": table.index}
-    return pd.concat([pd.DataFrame(named), table], axis=1)
+    return pd.concat([pd.DataFrame(named), table], axis=1).to_dict("list")
 
 
 def find_policy(name: str) -> Policy:

@@ -8,7 +8,7 @@ by from the noise that it learns from, and takes the mask in training apart. The
 ``data/ties/PLAN.md`` says what was expected.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -118,11 +118,15 @@ def ask_network(name: str, policy: Greedy) -> list[dict]:
     """Rows of ``ties/choice.csv``: a network, with noise, mask and place in all ways."""
     torch.set_num_threads(1)
     named = {"cell": cell_of(name), "seed": int(name.rpartition("_")[2])}
+    return [named | row for row in ask(policy, **LOADS, places=(True, False))]
+
+
+def ask(policy: Greedy, episodes: int, seed: int, places: Sequence[bool] = (True,)) -> list[dict]:
+    """``noise``, ``mask``, ``place`` and what ``evaluate_choice`` says, in all ways to ask."""
     return [
-        named
-        | {"noise": noise, "mask": mask, "place": place}
-        | evaluate_choice(policy, noise, mask, place, **LOADS)
-        for (noise, mask), place in product(WAYS, (True, False))
+        {"noise": noise, "mask": mask, "place": place}
+        | evaluate_choice(policy, noise, mask, place, episodes, seed)
+        for (noise, mask), place in product(WAYS, places)
     ]
 
 
@@ -197,9 +201,8 @@ def run_laboratory(name: str, planned: Cell, seed: int) -> dict:
     run = train_in_laboratory(config, planned.change, lambda run: trace.append(point(run)))
     points, policy = pd.DataFrame(trace), run.policy()
     row = {"cell": name, "seed": seed, "end": end_msr(run.curve.table())}
-    for noise, mask in WAYS:
-        choices = evaluate_choice(policy, noise, mask, **FEW_LOADS)
-        row[f"{noise}_{'mask' if mask else 'no_mask'}"] = choices["msr"]
+    for choices in ask(policy, **FEW_LOADS):
+        row[f"{choices['noise']}_{'mask' if choices['mask'] else 'no_mask'}"] = choices["msr"]
     row |= points[SLOPES].iloc[-1].to_dict() | points[TILTS].mean().to_dict()
     return row | {"tilt": float(points[TILTS].abs().mean().max())}
 

@@ -1,4 +1,7 @@
-"""How long an order of equals lasts; where runs end, by how ties are broken; single runs."""
+"""What came out, in one figure: the README's; and what ties do.
+
+How long an order of equals lasts; where runs end, by how ties are broken; single runs.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -11,14 +14,14 @@ from matplotlib.ticker import EngFormatter, ScalarFormatter
 
 from studies.falls.long import LONG
 from studies.grid import Grid, read_grid
-from studies.paper.training import PAPER
+from studies.paper.training import PAPER, SMOOTH
+from studies.results import read_table
 from studies.statistics import PAPER_MSR, PAPER_START, WINDOW_PICKS, by_run, windows
 from studies.style import COLOURS, WITHOUT_MASK, styled
-from studies.ties.choice import COUNTS, WAYS, evaluate_choice
+from studies.ties.choice import COUNTS, WAYS
 from studies.ties.criterion import WORDS, likeness, open_course
 from studies.ties.laboratory import RHOS
 from studies.ties.training import EARLIER, SWEPT, TIES
-from unload.agent.greedy import Greedy
 from unload.physics.bullet import GAP
 
 PICKS = 20_000_000  # of a run
@@ -32,6 +35,21 @@ KINDS: dict[str, list[tuple[Grid, str]]] = {
     "noise that\ndrifts": [(TIES, "drifting")],
     "settled walls,\nfrozen": [(EARLIER, "ties_by_drift")],
     "noise,\nfrozen": [(PAPER, "paper"), (LONG, "ranks"), (TIES, "frozen")],
+}
+
+# How a line is drawn by the batch, here and in the legend.
+BATCHES = {2048: "-", 256: (0, (4, 1.5))}
+# The cells of the paper's configuration by whether the mask is on in training, and by batch.
+TRAINED = {
+    "no mask": {2048: "paper_b2048_no_mask", 256: "paper_no_mask"},
+    "mask": {2048: "paper_b2048_mask", 256: "paper_mask"},
+}
+TRAINING_COLOURS = {"no mask": WITHOUT_MASK, "mask": COLOURS["ranks"]}
+# How the same agents choose afterwards: the rows of ``ties/choice.csv``, and the marker.
+ASKED = {
+    "without the mask": ({"mask": False, "place": True}, "o", "none"),
+    "with the mask": ({"mask": True, "place": True}, "o", "full"),
+    "by height alone": ({"mask": True, "place": False}, "^", "full"),
 }
 
 # What becomes of a pick, from the left, and its colour.
@@ -219,28 +237,13 @@ def draw_duration(runs: pd.DataFrame, long: pd.DataFrame) -> Figure:
     return figure
 
 
-def ask(policy: Greedy, episodes: int, seed: int) -> pd.DataFrame:
-    """Let a network choose in fresh containers in all four ways.
-
-    Args:
-        policy, episodes, seed: see ``evaluate_choice``.
-
-    Returns:
-        A row for each of ``WAYS``, as in ``ties/choice``.
-    """
-    rows = []
-    for noise, mask in WAYS:
-        counts = evaluate_choice(policy, noise, mask, episodes=episodes, seed=seed)
-        rows.append({"noise": noise, "mask": mask} | counts)
-    return pd.DataFrame(rows)
-
-
 @styled
 def draw_ways(groups: Mapping[str, pd.DataFrame]) -> Figure:
     """What becomes of the picks of some networks, in each of the four ways to ask them.
 
     Args:
-        groups: by the title of a panel, rows as those of ``ask``, of one network or of several.
+        groups: by the title of a panel, rows as ``choice.ask`` gives them, of one network or of
+            several.
     """
     across = min(len(groups), 3)
     down = -(-len(groups) // across)
@@ -276,3 +279,87 @@ def draw_ways(groups: Mapping[str, pd.DataFrame]) -> Figure:
 
 def _way(noise: str, mask: bool) -> str:
     return f"{noise}, {'mask' if mask else 'no mask'}"
+
+
+@styled
+def draw_answer() -> Figure:
+    """Learning curves by how agents are trained, and the same agents in new containers.
+
+    Strong lines are means over the runs of a batch, thin ones running means of single runs over
+    half a million picks; the last panel has a marker per agent.
+    """
+    curves, choices = read_grid(PAPER), read_table("ties/choice")
+    widths = {"width_ratios": [1, 1, 1, 1.25]}
+    figure, panels = plt.subplots(1, 4, figsize=(12.4, 3.9), sharey=True, gridspec_kw=widths)
+    for axes, (name, title) in zip(
+        panels,
+        {
+            "no mask": "1  Trained as in the paper,\n    without the mask",
+            "mask": "2  Trained with the mask:\n    up, then down",
+        }.items(),
+    ):
+        colour = TRAINING_COLOURS[name]
+        for batch, cell in TRAINED[name].items():
+            runs = _draw_runs(axes, curves, cell, colour, BATCHES[batch])
+            label = f"batch {batch} ({runs} agents)"
+            axes.plot([], [], c=colour, ls=BATCHES[batch], lw=2.2, label=label)
+        stars = {"ms": 11, "zorder": 5, "label": "the paper", "clip_on": False}
+        axes.plot([0, 20], [100 * PAPER_START, 100 * PAPER_MSR], "k*", **stars)
+        axes.set_title(title, loc="left")
+        axes.legend(loc="lower right", fontsize=8)
+    positions = [_draw_runs(panels[2], curves, f"positions_{mask}", COLOURS["positions"], "-")
+                 for mask in ("mask", "no_mask")]  # fmt: skip
+    panels[2].plot(
+        [], [], c=COLOURS["positions"], lw=2.2, label=f"batch 256 ({sum(positions)} agents)"
+    )
+    panels[2].set_title("3  Positions\n    instead of ranks", loc="left")
+    panels[2].legend(loc="lower right", fontsize=8)
+    for axes in panels[:3]:
+        axes.set(xlim=(0, 20), xticks=range(0, 21, 5), xlabel="million picks of training")
+    panels[0].set(ylim=(0, 103), ylabel="successful picks (%)")
+    _draw_choices(panels[3], choices)
+    look = {"ncols": 3, "fontsize": 8, "title_fontsize": 8, "handletextpad": 0.2}
+    title = "how the agents of panel 4 choose"
+    handles = panels[3].get_legend_handles_labels()
+    figure.legend(*handles, loc="outside lower right", title=title, **look)
+    return figure
+
+
+def _draw_runs(axes: Axes, curves: pd.DataFrame, cell: str, colour: str, line) -> int:
+    """Draw all runs of a cell, pale below their mean, and return how many they are."""
+    smooth = [
+        pd.Series(100 * run["success_rate"].rolling(SMOOTH, min_periods=1).mean().to_numpy(),
+                  run["picks"] / 1e6)
+        for _, run in curves[curves["cell"] == cell].groupby("seed")
+    ]  # fmt: skip
+    for run in smooth:
+        axes.plot(run, color=colour, linewidth=0.7, alpha=0.35)
+    axes.plot(pd.concat(smooth, axis=1).mean(axis=1), color=colour, linestyle=line, linewidth=2.2)
+    return len(smooth)
+
+
+def _draw_choices(axes: Axes, choices: pd.DataFrame) -> None:
+    """A marker per agent in new containers, by how it was trained and by how it chooses."""
+    frozen = choices[choices["noise"] == "frozen"]
+    names, column = [], 0
+    for name, cells in TRAINED.items():
+        for batch, cell in cells.items():
+            rows = frozen[frozen["cell"] == cell]
+            for shift, (label, (way, marker, fill)) in zip((-0.27, 0, 0.27), ASKED.items()):
+                chosen = rows[(rows[list(way)] == pd.Series(way)).all(axis=1)]
+                # Side by side within their place, so that equal ones can be counted.
+                places = column + shift + np.linspace(-0.09, 0.09, len(chosen))
+                look = {"ms": 3.5, "fillstyle": fill, "c": _dark(name), "clip_on": False}
+                label = label if column == 0 else None
+                axes.plot(places, 100 * chosen["msr"], marker, **look, label=label)
+            names.append(f"{name}\n{batch}")
+            column += 1
+    axes.set_xticks(range(column), names)
+    axes.set(xlabel="how they were trained, and the batch", xlim=(-0.5, column - 0.5))
+    axes.set_title("4  The same agents afterwards,\n    in new containers", loc="left")
+    axes.grid(axis="x", visible=False)
+
+
+def _dark(name: str) -> str:
+    """The colour of a training in the last panel, where pale markers would be lost."""
+    return "0.35" if name == "no mask" else TRAINING_COLOURS[name]

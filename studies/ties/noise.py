@@ -10,16 +10,21 @@ each pick, and with ρ = 1 it is frozen, as it is in the environments.
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.stats import spearmanr
 
 from unload import task
 from unload.agent.training import Training
-from unload.env.observation import POSITION_NOISE
+from unload.env.equalization import equalize
+from unload.env.observation import POSITION_NOISE, drift, nearest, scale
+from unload.load.boxes import ABOVE
+from unload.load.substacks import stack_load
 
 # Standard deviation of the offsets on each axis in scaled coordinates. Ranks depend on their
 # order alone, as long as they are small beside the 3.5 cm between the places of the paper's loads.
 SPREAD = 2 * POSITION_NOISE / task.CONTAINER
 # Equalized coordinates by rank. ``unload.equalize`` ranks exactly equal positions otherwise.
 LEVELS = np.linspace(-1, 1, task.N_VISIBLE, dtype=np.float32)[None, None]
+HOW_BROKEN = {"order": 0.0, "noise": POSITION_NOISE}  # m
 MOST_ITEMS = 1100  # for which the environments make room, where a load has up to 1,000
 
 
@@ -133,3 +138,35 @@ def renewed(run: Training, correlation: Sequence[float] = (0.0, 0.0, 0.0)) -> No
         add(observations=run.kept["seen"], rewards=rewards, **rest)
 
     run.agent.choose, run.replay.add = choose_by_ties, add_as_seen
+
+
+def told_by_rank(load_seed: int, ties: str) -> dict:
+    """How far the rank along x tells the height in a full load, by how ties are broken.
+
+    Rows are sorted nearest first, so that the items' order is height. ``ties/leak`` says what
+    networks of jams by order, with the paper's batch, do of it: a row for each network, way to
+    break ties, and mask, with its ``msr`` in fresh containers without jams.
+
+    Returns:
+        ``spearman``, the mean rank correlation of the ranks along x and z of the visible boxes of
+        a wall; ``pairs`` of a visible box and a visible one that lies on it, and of those the
+        number in which the ``upper`` one has the lower rank along x.
+    """
+    rng = np.random.default_rng(load_seed)
+    load = stack_load(rng)
+    positions = load.positions + drift(len(load), HOW_BROKEN[ties], rng)
+    seen = nearest(positions)
+    ranks = equalize(scale(positions[seen]))
+    walls = load.walls[seen]
+    found = [
+        spearmanr(*ranks[walls == wall][:, [0, 2]].T).statistic
+        for wall in np.unique(walls)
+        if (walls == wall).sum() > 3
+    ]
+    along_x = np.full(len(load), np.nan)
+    along_x[seen] = ranks[:, 0]
+    below, above = (along_x[each] for each in load.contacts.pairs(ABOVE))
+    return {
+        "load": load_seed, "ties": ties, "spearman": float(np.mean(found)),
+        "pairs": int(np.isfinite(below + above).sum()), "upper": int((above < below).sum()),
+    }  # fmt: skip

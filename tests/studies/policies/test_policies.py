@@ -42,7 +42,7 @@ def test_the_first_containers_of_a_condition_are_those_of_the_committed_data(
     monkeypatch.setattr(comparison, "LOADS", 2)
     rows = read_table("policies").query("policy == 'nearest' and condition == @condition")
     found = comparison.compare("nearest", True, condition)["success_rate"]
-    assert rows["success_rate"].head(2).tolist() == pytest.approx(found.tolist(), abs=1e-5)
+    assert rows["success_rate"].head(2).tolist() == pytest.approx(found, abs=1e-5)
 
 
 @pytest.mark.parametrize("scale", comparison.FITTING)

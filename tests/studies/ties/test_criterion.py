@@ -10,9 +10,10 @@ import pytest
 from studies import paths
 from studies.grid import published_runs, read_grid
 from studies.results import read_provenance, read_table
-from studies.ties import leak, training
+from studies.ties import training
 from studies.ties.criterion import FIG11, FIG12, READINGS, likeness, noisier_readings, scatter
 from studies.ties.laboratory import CELLS
+from studies.ties.noise import told_by_rank
 from tests.studies.test_statistics import course
 
 # Of ten million picks in twenty windows: falls, rises, sinks slowly; the MSR becomes slower and
@@ -111,7 +112,7 @@ def test_the_runs_of_the_first_plan_are_all_there():
 
 @pytest.mark.parametrize("ties", ["order", "noise"])
 def test_order_tells_which_box_is_the_upper_one(ties):
-    told = leak.told_by_rank(leak.LOADS[0], ties)
+    told = told_by_rank(700, ties)
     if ties == "order":
         assert told["upper"] == told["pairs"] and told["spearman"] < -0.8
     else:
