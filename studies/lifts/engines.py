@@ -7,8 +7,6 @@ situations of ``agreement``. In ``data/engines_msr.csv`` policies whose MSR is p
 unloaded the same containers once more, with none but MuJoCo's answers.
 """
 
-from collections.abc import Iterator
-
 import pandas as pd
 
 from studies.lifts.agreement import FIRST_SEED, LIFT_COUNT, collect_lifts
@@ -17,7 +15,7 @@ from studies.statistics import share_interval
 from unload import task
 from unload.physics.bullet import ENGINES
 from unload.physics.local import LocalPhysics, settings_of_lifts
-from unload.physics.situation import Situation, Surroundings
+from unload.physics.situation import Surroundings
 
 NAME = "engines"
 
@@ -30,13 +28,6 @@ def engines_data() -> None:
     publish(NAME, tables, f"{COMMAND} engines", settings, [lifts], float_format="%.6f")
 
 
-def situations() -> Iterator[tuple[int, Situation]]:
-    """The situations of ``lift_agreement.csv``, each once, with their numbers there."""
-    states, frame = collect_lifts(LIFT_COUNT, FIRST_SEED)
-    for row in frame.drop_duplicates("situation").itertuples():
-        yield row.situation, Surroundings(*states[row.state]).situation(row.item)
-
-
 def compare_lifts() -> pd.DataFrame:
     """How far each engine moves the box of each situation: the rows of ``engines.csv``.
 
@@ -44,9 +35,11 @@ def compare_lifts() -> pd.DataFrame:
     chosen one; by engine, how far this one moved, in m.
     """
     physics, rows = {engine: LocalPhysics(engine) for engine in ENGINES}, []
-    for number, situation in situations():
+    states, frame = collect_lifts(LIFT_COUNT, FIRST_SEED)
+    for row in frame.drop_duplicates("situation").itertuples():
+        situation = Surroundings(*states[row.state]).situation(row.item)
         distances = {engine: each.simulate(situation) for engine, each in physics.items()}
-        rows.append({"situation": number, "on_top": situation.on_top, **distances})
+        rows.append({"situation": row.situation, "on_top": situation.on_top, **distances})
     return pd.DataFrame(rows)
 
 

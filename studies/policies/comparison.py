@@ -30,17 +30,9 @@ from unload.agent import policies
 from unload.agent.config import TrainConfig
 from unload.agent.evaluation import Policy, evaluate
 from unload.agent.greedy import load_policy, save_policy, settings_of
+from unload.load import substacks
 from unload.load.boxes import Load
-from unload.load.substacks import (
-    CELL,
-    CELLS_HIGH,
-    COLUMNS,
-    LEFT,
-    MID,
-    PACKAGES,
-    RIGHT,
-    stack_load,
-)
+from unload.load.substacks import stack_load
 from unload.network.weights import weights_file
 from unload.physics.bullet import SETTINGS
 from unload.support import files
@@ -58,18 +50,21 @@ def scaled_load(scale: float, rng: np.random.Generator) -> Load:
         rng: the source of randomness.
     """
     walls, rows, columns = FITTING[scale]
-    edges, substacks = [left for left, _ in COLUMNS], (LEFT, *[MID] * (columns - 2), RIGHT)
+    edges = [left for left, _ in substacks.COLUMNS]
+    kinds = (substacks.LEFT, *[substacks.MID] * (columns - 2), substacks.RIGHT)
     variants = rng.integers(3, size=(walls, rows, columns))
     boxes = np.array(
         [
-            (package, wall, edges[column] + left, CELLS_HIGH * row + low)
+            (package, wall, edges[column] + left, substacks.CELLS_HIGH * row + low)
             for (wall, row, column), variant in np.ndenumerate(variants)
-            for package, left, low in substacks[column][variant]
+            for package, left, low in kinds[column][variant]
         ]
     )
     packages, corners = boxes[:, 0], boxes[:, 1:]
-    sizes = np.insert(PACKAGES, 0, 1, axis=1)[packages]  # in walls and cells, as the corners
-    units = np.array([task.CONTAINER[0] / walls, CELL * scale, CELL * scale])
+    # In walls and cells, as the corners.
+    sizes = np.insert(substacks.PACKAGES, 0, 1, axis=1)[packages]
+    cell = substacks.CELL * scale
+    units = np.array([task.CONTAINER[0] / walls, cell, cell])
     return Load((corners + sizes / 2) * units, sizes * units, packages, corners[:, 0])
 
 
@@ -207,14 +202,9 @@ def compare(name: str, mask: bool, condition: str) -> dict[str, list]:
         Its columns, and ``policy``, ``mask``, ``condition`` and ``load`` before them.
     """
     arguments = {"episodes": LOADS, "seed": SEED, "mask": mask} | CONDITIONS[condition]
-    table = evaluate(find_policy(name), **arguments)
+    table = evaluate(SIMPLE.get(name) or load_policy(name), **arguments)
     named = {"policy": name, "mask": mask, "condition": condition, "load": table.index}
     return pd.concat([pd.DataFrame(named), table], axis=1).to_dict("list")
-
-
-def find_policy(name: str) -> Policy:
-    """A rule, or a policy that ships, by its name."""
-    return SIMPLE[name] if name in SIMPLE else load_policy(name)
 
 
 def digests() -> dict[str, str]:

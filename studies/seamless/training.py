@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 
 from studies import changes
-from studies.grid import Cell, Grid, cell, read_grid, train_grid
-from studies.results import COMMAND, write_table
+from studies.grid import Cell, Grid, cell, train_grid
+from studies.results import COMMAND, read_table, write_table
 from studies.seamless.jamming import jam, jam_by_place, weigh
 from unload import task
 from unload.agent.checkpoint import RunFolder, settings_of_run
@@ -94,11 +94,11 @@ def export(wall_time: Sequence[float]) -> None:
         wall_time: of each point of its curve, s since the epoch.
     """
     name, seed = EXPORTED
-    curves = read_grid(SEAMLESS, [name])
-    curve = curves[curves["seed"] == seed].reset_index(drop=True)
+    table = read_table(SEAMLESS.name)
+    loss, msr = (table[f"{column} {name}/seed_{seed}"] for column in ("loss", "success_rate"))
     for exported, values in (
-        ("loss_function_agent", curve["loss"]),
-        ("total_rew_function_agent", (2 * curve["success_rate"] - 1) * task.MAX_PICKS),
+        ("loss_function_agent", loss),
+        ("total_rew_function_agent", (2 * msr - 1) * task.MAX_PICKS),
     ):
-        table = pd.DataFrame({"Wall time": wall_time, "Step": curve["picks"], "Value": values})
-        write_table(exported, table.dropna(), "%.12g")
+        columns = {"Wall time": wall_time, "Step": table["picks"], "Value": values}
+        write_table(exported, pd.DataFrame(columns).dropna(), "%.12g")

@@ -266,7 +266,11 @@ def draw_ways(groups: Mapping[str, pd.DataFrame]) -> Figure:
                 start += share
             axes.text(2, place, f"{counts['msr']:.0%}", va="center", color="white", fontsize=9)
         axes.set(title=title, xlim=(0, 100), ylim=(len(WAYS) - 0.5, -0.5))
-        axes.set_yticks(range(len(WAYS)), [_way(*way) for way in WAYS], fontsize=9)
+        axes.set_yticks(
+            range(len(WAYS)),
+            [f"{noise}, {'mask' if mask else 'no mask'}" for noise, mask in WAYS],
+            fontsize=9,
+        )
         axes.grid(axis="y", visible=False)
     for axes in panels[len(groups) :]:
         axes.set_axis_off()
@@ -275,10 +279,6 @@ def draw_ways(groups: Mapping[str, pd.DataFrame]) -> Figure:
     handles = panels[0].get_legend_handles_labels()[0][: len(OUTCOMES)]
     figure.legend(handles, OUTCOMES, loc="outside lower center", ncols=4, fontsize=9)
     return figure
-
-
-def _way(noise: str, mask: bool) -> str:
-    return f"{noise}, {'mask' if mask else 'no mask'}"
 
 
 @styled
@@ -349,7 +349,9 @@ def _draw_choices(axes: Axes, choices: pd.DataFrame) -> None:
                 chosen = rows[(rows[list(way)] == pd.Series(way)).all(axis=1)]
                 # Side by side within their place, so that equal ones can be counted.
                 places = column + shift + np.linspace(-0.09, 0.09, len(chosen))
-                look = {"ms": 3.5, "fillstyle": fill, "c": _dark(name), "clip_on": False}
+                # Dark, because pale markers would be lost.
+                dark = "0.35" if name == "no mask" else TRAINING_COLOURS[name]
+                look = {"ms": 3.5, "fillstyle": fill, "c": dark, "clip_on": False}
                 label = label if column == 0 else None
                 axes.plot(places, 100 * chosen["msr"], marker, **look, label=label)
             names.append(f"{name}\n{batch}")
@@ -358,8 +360,3 @@ def _draw_choices(axes: Axes, choices: pd.DataFrame) -> None:
     axes.set(xlabel="how they were trained, and the batch", xlim=(-0.5, column - 0.5))
     axes.set_title("4  The same agents afterwards,\n    in new containers", loc="left")
     axes.grid(axis="x", visible=False)
-
-
-def _dark(name: str) -> str:
-    """The colour of a training in the last panel, where pale markers would be lost."""
-    return "0.35" if name == "no mask" else TRAINING_COLOURS[name]

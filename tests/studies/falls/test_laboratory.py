@@ -82,18 +82,6 @@ def test_the_published_traces_are_of_the_whole_runs_that_are_traced():
     assert set(long_trace["picks"]) == set(range(31_936, 20_000_000, 32_000))
 
 
-def test_cells_differ_from_the_first_in_what_they_are_named_for():
-    configs = {name: cell.config for name, cell in laboratory.CELLS.items()}
-    plain, paper = configs["ranks"], PAPER.cells["paper_mask"].config
-    assert configs["ranks_no_mask"] == replace(plain, mask=False) and plain.mask
-    assert configs["ranks_features"] == replace(plain, n_features=paper.n_features) != plain
-    slow = cells.FRESH["shuffled_no_mask_learning_rate"].config
-    assert slow == replace(plain, mask=False, learning_rate=paper.learning_rate) != plain
-    for axis, name in enumerate(("averaged_x", "averaged_y", "averaged_z")):
-        assert not configs[name].equalize and cells.SEEN[name].keywords == {"averaged": (axis,)}
-    assert 2 * plain.epsilon(cells.HELD_FROM) == plain.epsilon(0) + plain.epsilon(plain.picks)
-
-
 def test_the_rule_was_fitted_on_the_published_networks():
     """Of 290 networks with the mask and ties of x broken by noise; 190 of them are kept."""
     fitted = ["ranks", "mirrored", "shuffled", "untilted", "untilted_y", "averaged_y", "averaged_z"]
@@ -198,12 +186,3 @@ def test_judging_without_place_makes_height_decide(network):
     with_mask = measures.judged(network, config, loads=loads)
     assert measures.judged(network, replace(config, mask=False), loads=loads) < with_mask - 0.2 < 1
     assert measures.judged(network, config, seen=lambda o: o * [1, 0, 1], loads=loads) == 1
-
-
-def test_depth_misleads_only_where_ranks_are_random():
-    msr = {
-        (x, y, ties): evaluate(measures.preferring(x, y, ties), 2)["success_rate"].mean()
-        for x, y, ties in ((0, 0, "noise"), (1, 0, "noise"), (1, 0, "average"), (0, 1, "average"))
-    }
-    assert msr[0, 0, "noise"] == 1 == msr[1, 0, "average"]
-    assert msr[1, 0, "noise"] < 0.8 and msr[0, 1, "average"] < 0.8

@@ -2,7 +2,6 @@
 
 from functools import partial
 
-import gymnasium
 import numpy as np
 import pandas as pd
 import pytest
@@ -10,10 +9,12 @@ import pytest
 from studies import paths
 from studies.lifts import agreement, engines
 from studies.lifts import lift_table as lifts
-from studies.lifts.few_boxes import hard_situations, partly_on_top, record, top_lifts
+from studies.lifts.figures import hard_situations, partly_on_top, record, top_lifts
+from studies.policies import margin
 from studies.policies.comparison import front_walls
 from studies.results import read_provenance, read_table
 from unload import policies, task
+from unload.env.container import ContainerEnv
 from unload.env.vector import ContainerVectorEnv
 from unload.load.substacks import stack_load
 from unload.physics.bullet import ENGINES, GAP
@@ -53,7 +54,7 @@ def test_a_fresh_lift_is_in_the_boxes_left_in_the_walls_around(full_load):
 def test_full_is_asked_once(own_data, set_in):
     """Three lifts in a container of two walls, after 30 picks."""
     stack = {"stack": lambda rng: front_walls(stack_load(rng), 2)}
-    set_in(agreement.gymnasium, make=partial(gymnasium.make, **stack))
+    set_in(margin, ContainerEnv=partial(ContainerEnv, **stack))
     set_in(agreement, STAGES=(30,), WANTED=(1, 1, 1, 0), LIFT_COUNT=3, FULL_COUNT=3)
     set_in(agreement, UNLOADED_BY={"highest": policies.highest}, FIRST_SEED=5)
     agreement.agreement_data()
@@ -122,25 +123,8 @@ def test_committed_lifts_of_the_second_engine_can_be_computed_again(monkeypatch)
     assert f"{len(table):,} situations" in lifting
     assert (lifted["pybullet"] == lifted["mujoco"]).all()
     monkeypatch.setattr(engines, "LIFT_COUNT", 60)
-    table, physics = table.set_index("situation"), LocalPhysics("mujoco")
-    for number, situation in engines.situations():
-        assert physics.simulate(situation) == pytest.approx(table.loc[number, "mujoco"], abs=1e-4)
-
-
-def test_lifts_of_another_physics_are_computed_anew(monkeypatch):
-    """What is kept of a fill answers for the physics that it was filled by."""
-    asked = []
-
-    def ask(place, compute, questions, n_jobs):
-        asked.append(questions[0][0])
-        raise InterruptedError
-
-    monkeypatch.setattr(lifts, "keep_all", ask)
-    for settings in (lifts.SETTINGS, lifts.SETTINGS | {"pybullet": "another"}):
-        monkeypatch.setattr(lifts, "SETTINGS", settings)
-        with pytest.raises(InterruptedError):
-            lifts.lift_data()
-    assert asked[0] != asked[1]
+    found = engines.compare_lifts()
+    pd.testing.assert_frame_equal(found, table[: len(found)], rtol=0, atol=1e-4)
 
 
 @pytest.mark.pybullet
