@@ -7,7 +7,7 @@ import torch
 
 from studies import paths
 from studies.heap import env as heap_env
-from studies.heap import generate, greed, recording
+from studies.heap import generate, greed, picture, recording
 from studies.heap import table as study
 from studies.heap.boxes import Heap
 from studies.heap.learning import load_networks, save_networks
