@@ -11,9 +11,8 @@ from studies.lifts import agreement, engines, lift_table
 from studies.paper import training, tuning, visible_items
 from studies.policies import comparison, variants
 from studies.results import COMMAND
-from studies.seamless import jam_tables, mujoco_jams
 from studies.seamless import training as seamless
-from studies.ties import choice, creep, earlier, leak
+from studies.ties import choice
 from studies.ties import laboratory as ties_laboratory
 from studies.ties import training as ties
 
@@ -51,7 +50,7 @@ def sb3(n_jobs: int) -> None:
 # Part → summary, what makes its data, and its options.
 PARTS: dict[str, tuple[str, Callable, dict]] = {
     "lifts": ("the lift table, and the physics that it stands for", lifts, JOBS),
-    "engines": ("lifts and MSRs by a second engine", engines.engines_data, JOBS),
+    "engines": ("lifts by a second engine", engines.engines_data, {}),
     "observation": ("Figs. 4–6", visible_items.observation_data, {}),
     "tuning": ("Figs. 8–10", tuning.tuning_data, JOBS),
     "training": ("Figs. 11 and 12", training.training_data, some(training.PAPER.cells)),
@@ -60,13 +59,9 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "sb3": ("agents of Stable-Baselines3, trained for minutes", sb3, JOBS),
     "laboratory": ("why runs fall: the laboratory", laboratory.laboratory_data, JOBS),
     "fresh": ("why runs fall: fresh seeds", laboratory.fresh_data, JOBS),
-    "jams": ("jams in seamless walls, every box simulated", jam_tables.both_data, JOBS),
-    "mujoco_jams": ("the same with MuJoCo", mujoco_jams.mujoco_data, JOBS),
     "seamless": (
         "seamless walls, in which boxes jam", seamless.seamless_data, some(seamless.CELLS)
     ),
-    "creep": ("how long the order of equals lasts in PyBullet", creep.creep_data, JOBS),
-    "leak": ("what ties by the items' order tell a network", leak.leak_data, JOBS),
     "ties_laboratory": (
         "how long an order of equals lasts: the laboratory", ties_laboratory.laboratory_data, JOBS
     ),
@@ -77,7 +72,6 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
         "noise at the choice or in the memory, the mask in training: the laboratory",
         choice.choice_laboratory_data, JOBS,
     ),
-    "earlier": ("runs of the first plan, from this repository's history", earlier.earlier_data, {}),
     "heap": ("heaps, of which a rake picks several boxes at once", table.heap_data, JOBS),
     "greed": ("heaps pick by pick", greed.greed_data, JOBS),
 }  # fmt: skip

@@ -149,11 +149,8 @@ def best_actions(
     return np.where(allowed, score, -np.inf).argmax(axis=1)
 
 
-def taught(
-    run: Training, preference: float, change: Callable[[Training], None] | None = None
-) -> None:
-    """Make a change, and let the policy of ``best_actions`` choose."""
-    several(run, (change,))
+def taught(run: Training, preference: float) -> None:
+    """Let the policy of ``best_actions`` choose."""
     run.agent.learner.best_actions = partial(best_actions, preference=preference)
 
 
@@ -187,15 +184,14 @@ def dug(run: Training, preference: float) -> None:
     run.rollout.envs.unwrapped.stack = lambda rng: loads[rng.integers(len(loads))]
 
 
-def perfect_start(run: Training, change: Callable[[Training], None] | None = None) -> None:
-    """Start from the weights of a run with shuffled places; then ``change``."""
+def perfect_start(run: Training) -> None:
+    """Start from the weights of a run with shuffled places."""
     teacher = Training(replace(run.config, epsilon_init=1.0))
     shuffled(teacher)
     while not teacher.rollout.finished:
         teacher.step()
     teacher.rollout.close()
     run.agent.network.load_state_dict(teacher.agent.network.state_dict())
-    several(run, (change,))
 
 
 def several(run: Training, makes: Iterable[Callable[[Training], None] | None]) -> None:

@@ -18,11 +18,10 @@ import torch
 
 from studies import paths
 from studies.fingerprint import training_fingerprint
-from studies.networks import NETWORKS
 from studies.results import joined, read_provenance, read_table, write_provenance, write_table
 from studies.sweep import run_sweep
 from unload.agent.checkpoint import RunFolder, settings_of_run
-from unload.agent.config import EXPLORATION_FRACTION, TrainConfig
+from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, policy_of, settings_of
 from unload.agent.training import Training
 from unload.network.weights import read_weights, write_weights
@@ -30,10 +29,6 @@ from unload.support import checks, files
 
 # Of a curve, what is published, and its digits: a success rate of 64 picks needs six.
 COLUMNS = {"success_rate": "{:.6g}", "loss": "{:.5g}"}
-# Fields that a configuration once had, with the one value that they had in all published runs.
-FORMER_FIELDS = {
-    "epsilon_fraction": EXPLORATION_FRACTION, "shuffle_places": False, "checkpoint_interval": 60.0,
-}  # fmt: skip
 
 
 class Cell(NamedTuple):
@@ -234,27 +229,3 @@ def read_policies(path: str | Path) -> dict[str, Greedy]:
         return {name: policy_of(each, of_run[name]) for name, each in settings.items()}
 
     return read_weights(path, "policies", policies)
-
-
-def recorded_config(settings: Mapping[str, Any]) -> TrainConfig:
-    """The configuration whose fields stand in a provenance, see ``TrainConfig.plain``.
-
-    Args:
-        settings: the fields by name; those of ``FORMER_FIELDS`` may be among them. A network of
-            ``studies.networks`` stands there by its qualified name, perhaps with a digest of its
-            file as it was then.
-
-    Raises:
-        ValueError: one of ``FORMER_FIELDS`` has another value than it had in all published runs.
-    """
-    fields = dict(settings)
-    for name, value in FORMER_FIELDS.items():
-        found = fields.pop(name, value)
-        if found != value:
-            raise ValueError(
-                f"{name} is {found!r}; expected {value!r}, because a configuration has no such "
-                "field any more"
-            )
-    own = {f"{kind.__module__}.{kind.__name__}": kind for kind in NETWORKS.values()}
-    network, *_ = fields["network"].split()
-    return TrainConfig(**fields | {"network": own.get(network, network)})

@@ -63,14 +63,8 @@ def steady(curve: pd.DataFrame) -> bool:
 def resembles_fig11(curve: pd.DataFrame) -> bool:
     """Whether the loss rises by a tenth from a minimum, and falls by a tenth afterwards."""
     loss = windows(curve)["loss"].dropna()
-    peak = loss_peak(loss)
-    return peak is not None and bool(loss.iloc[-1] <= 0.9 * loss[peak])
-
-
-def loss_peak(loss: pd.Series) -> int | None:
-    """Return the window of the highest loss after a rise by a tenth; None without such a rise."""
     risen = loss[loss >= 1.1 * loss.cummin()]
-    return None if risen.empty else int(risen.idxmax())
+    return bool(loss.iloc[-1] <= 0.9 * risen.max())  # NaN without such a rise
 
 
 def first_plan(curve: pd.DataFrame) -> dict:

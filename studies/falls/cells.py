@@ -48,6 +48,12 @@ DUG = {"dug_to_y": 0.4, "dug_from_y": -0.4}
 
 Change = Callable[[Training], None] | None
 
+
+def changed(*makes: Change) -> Change:
+    """Several changes as one."""
+    return partial(changes.several, makes=makes)
+
+
 CELLS: dict[str, Cell] = {
     **{
         f"{name}{ending}": cell(CONFIG, seeds, change, mask=mask, **fields)
@@ -70,14 +76,14 @@ CELLS: dict[str, Cell] = {
     "perfect_successes": cell(
         CONFIG,
         FEW_SEEDS,
-        partial(changes.perfect_start, change=partial(changes.successes_only, start=0)),
+        changed(changes.perfect_start, partial(changes.successes_only, start=0)),
         epsilon_init=0.0,
     ),
     **{
         f"{pupil}_{preference}": cell(
             TAUGHT,
             FEW_SEEDS,
-            partial(changes.taught, preference=preference, change=change),
+            changed(change, partial(changes.taught, preference=preference)),
             **fields,
         )
         for pupil, (change, fields) in PUPILS.items()
@@ -87,8 +93,8 @@ CELLS: dict[str, Cell] = {
         name: cell(
             TAUGHT,
             FEW_SEEDS,
-            partial(
-                changes.taught, preference=0.0, change=partial(changes.dug, preference=preference)
+            changed(
+                partial(changes.dug, preference=preference), partial(changes.taught, preference=0.0)
             ),
             **SHORT,
         )

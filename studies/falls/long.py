@@ -6,7 +6,7 @@ Judged are all published policies, with a part of what they see blanked, and net
 training.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -21,6 +21,7 @@ from studies.grid import Grid, cell, cell_of, read_policies, train_grid
 from studies.paper.training import PAPER
 from studies.results import COMMAND, code_of, keep_all, publish
 from unload.agent.config import TrainConfig
+from unload.agent.greedy import Greedy
 from unload.network.peq import PEQNetwork
 
 CONFIG = TrainConfig(batch_size=256, mask=True)
@@ -90,19 +91,13 @@ def published_data(n_jobs: int = -1) -> None:
     mask on. The cell ``untrained`` holds networks as they are drawn.
     """
     fingerprint = training_fingerprint()
-    judged = {
-        name: (replace(grid.cells[cell_of(name)].config, mask=True), policy.network)
-        for grid in (PAPER, LONG)
-        for name, policy in read_policies(paths.DATA / f"{grid.name}.safetensors").items()
-    }
-    # Networks as they are drawn say what those of the trained ones owe to their training.
-    for seed in range(UNTRAINED):
-        network = PEQNetwork(generator=torch.Generator().manual_seed(seed))
-        judged[f"untrained/seed_{seed}"] = PAPER.cells["paper_mask"].config, network
+    configs = {name: cell.config for grid in (PAPER, LONG) for name, cell in grid.cells.items()}
+    configs["untrained"] = configs["paper_mask"]
 
     # The weights are part of the question: a policy that was trained again is judged again.
     asked = []
-    for name, (config, network) in judged.items():
+    for name, policy in published_networks((PAPER, LONG)).items():
+        config, network = replace(configs[cell_of(name)], mask=True), policy.network
         question = {"name": name, "weights": code_of(network), **config.plain(), **LOADS}
         question["fingerprint"] = fingerprint
         asked.append((question, (name, config, network)))
@@ -111,6 +106,23 @@ def published_data(n_jobs: int = -1) -> None:
     publish("falls/published", tables, f"{COMMAND} falls", LOADS, results, fingerprint)
 
 
+def published_networks(grids: Iterable[Grid]) -> dict[str, Greedy]:
+    """The published policies of grids, and ``UNTRAINED`` networks as they are drawn.
+
+    These say what those of the trained ones owe to their training.
+    """
+    policies: dict[str, Greedy] = {}
+    for grid in grids:
+        policies |= read_policies(paths.DATA / f"{grid.name}.safetensors")
+    for seed in range(UNTRAINED):
+        network = PEQNetwork(generator=torch.Generator().manual_seed(seed))
+        policies[f"untrained/seed_{seed}"] = Greedy(network, equalize=True)
+    return policies
+
+
 def _judge(name: str, config: TrainConfig, network: PEQNetwork) -> dict:
     row = {"cell": cell_of(name), "seed": int(name.rpartition("_")[2])}
-    return row | measures.judged_blanked(network, config, loads=LOADS)
+    return row | {
+        f"judged_{name}": measures.judged(network, config, blank, loads=LOADS)
+        for name, blank in measures.BLANKED.items()
+    }

@@ -99,14 +99,6 @@ def judged(
     return evaluate(policy, mask=config.mask, **loads, **env)["success_rate"].mean()
 
 
-def judged_blanked(network: nn.Module, config: TrainConfig, loads: dict) -> dict[str, float]:
-    """``judged`` with the coordinates of each of ``BLANKED`` set to 0, by ``judged_<its name>``."""
-    return {
-        f"judged_{name}": judged(network, config, blank, loads=loads)
-        for name, blank in BLANKED.items()
-    }
-
-
 def preferring(along_x: float, along_y: float, ties: str = "noise") -> Policy:
     """The rule that picks the highest z + along_x · x + along_y · y of ``equalize``'s ranks."""
     weights = np.array([along_x, along_y, 1], np.float32)

@@ -2,8 +2,7 @@
 
 Read ``boxes``, ``rake``, ``generate``, ``observation``, ``env``, ``policies``, ``network`` and
 ``learning``, in this order; ``picture`` draws a heap, ``recording`` and ``table`` compare the
-policies, and ``greed`` plays them pick by pick, which ``figures`` draws. Importing this registers
-``unload/Heap-v0``.
+policies, and ``greed`` plays them pick by pick. Importing this registers ``unload/Heap-v0``.
 """
 
 import gymnasium

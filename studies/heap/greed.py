@@ -8,9 +8,11 @@ heaps pick by pick: the best rule alone, the networks alone, and the networks fr
 the rule leaves after some picks. Nothing is trained. What is computed is kept in ``runs/heap``.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import torch
+from matplotlib.figure import Figure
 
 from studies import paths
 from studies.heap.boxes import Heap
@@ -19,10 +21,11 @@ from studies.heap.generate import stored_heaps
 from studies.heap.learning import Learned, load_networks
 from studies.heap.policies import Episode, play
 from studies.heap.recording import HEAPS, NAME
-from studies.heap.table import REFERENCE, SHOWN_WEIGHT, best_rule
+from studies.heap.table import LEARNED, LINES, REFERENCE, SHOWN_WEIGHT, best_rule
 from studies.heap.table import candidates as rules_by_name
 from studies.results import COMMAND, code_of, keep_all, publish, read_table
-from studies.statistics import ratio_interval
+from studies.statistics import mean_interval, ratio_interval
+from studies.style import styled
 from unload.support import files
 
 GREED = f"{NAME}/greed"
@@ -136,3 +139,30 @@ def ratios(frame: pd.DataFrame) -> pd.DataFrame:
             rows[part, after] = *means, *ratio_interval(net[after], net[MAX_PICKS])
     index = pd.MultiIndex.from_tuples(rows, names=["part", "rule_picks"])
     return pd.DataFrame(rows.values(), index, ["rule", "episode", "ratio", "low", "high"])
+
+
+@styled
+def net_by_pick(frame: pd.DataFrame) -> Figure:
+    """Boxes - falls by the number of the pick: the best rule's and the networks'.
+
+    A dot is a pick's mean over heaps, a line the mean of five picks with its 95 % BCa bootstrap
+    interval over heaps.
+
+    Args:
+        frame: see ``greed_data``.
+    """
+    figure, axes = plt.subplots(figsize=(6.4, 3.6))
+    for rule_picks, name in ((MAX_PICKS, REFERENCE), (0, LEARNED)):
+        colour, picks = LINES[name], range(1, MAX_PICKS + 1)
+        means = [nets(frame, (pick, pick))[rule_picks].mean() for pick in picks]
+        axes.plot(picks, means, "o", color=colour, ms=3.5, alpha=0.6)
+        for first, last in PARTS.values():
+            ends = first - 0.4, last + 0.4
+            net = nets(frame, (first, last))[rule_picks] / (last - first + 1)
+            mean, low, high = mean_interval(net)
+            label = name if first == 1 else None
+            axes.plot(ends, (mean, mean), color=colour, lw=2, label=label)
+            axes.fill_between(ends, low, high, color=colour, alpha=0.15, lw=0)
+    axes.set(xlabel="pick", ylabel="boxes − falls", xticks=(1, 5, 10, 15), ylim=(0, None))
+    axes.legend()
+    return figure

@@ -71,12 +71,11 @@ class Oracle:
     Args:
         env: whose heap it is.
         falls_weight: λ of what it maximizes, boxes - λ falls.
-        physics: of the environment, see ``Rake``.
     """
 
-    def __init__(self, env: HeapEnv, falls_weight: float, physics: str = "whole") -> None:
+    def __init__(self, env: HeapEnv, falls_weight: float) -> None:
         self.env, self.falls_weight = env, falls_weight
-        self._rakes = [Rake("coarse"), Rake(physics)]
+        self._rakes = [Rake("coarse"), env._rake]
 
     def __call__(self, observations, masks, rng: np.random.Generator) -> np.ndarray:
         rows = np.flatnonzero(masks[0])

@@ -155,7 +155,7 @@ def _play(player: dict, split: str, number: int, physics: str) -> dict[str, floa
     elif "networks" in player:
         policy = Learned(load_networks(player["networks"]), player["falls_weight"])
     else:
-        policy = Oracle(env, player["oracle"], physics)
+        policy = Oracle(env, player["oracle"])
     episode = play(env, policy, env.heaps[number], seed=number)
     return {"boxes": float(episode.unloaded.mean()), "falls": float(episode.falls.mean())}
 

@@ -2,5 +2,5 @@
 
 Read ``lift_table`` (known lifts), ``agreement`` (the same lifts asked of the table, of PyBullet
 around the box, and of PyBullet with all boxes) and ``engines`` (of PyBullet and of MuJoCo).
-``few_boxes`` lifts what notebook 10 looks at, and ``figures`` draws all of it.
+``figures`` lifts what notebook 10 looks at, and draws all of it.
 """

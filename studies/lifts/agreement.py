@@ -11,20 +11,18 @@ boxes on top, which ``table`` answers without a simulation; and all that are clo
 of a policy, ``studies.policies.comparison`` tells.
 """
 
-from collections.abc import Iterator
 from functools import partial
 from hashlib import blake2b
 
-import gymnasium
 import numpy as np
 import pandas as pd
 
 from studies.lifts.lift_table import mixed
 from studies.policies.comparison import SIMPLE
+from studies.policies.margin import containers
 from studies.results import COMMAND, keep_all, measured, publish
 from studies.statistics import share_interval
 from unload import task
-from unload.env.container import ContainerEnv
 from unload.load.boxes import Load
 from unload.load.substacks import WALLS
 from unload.physics.bullet import ENGINES, SETTINGS
@@ -126,19 +124,6 @@ def error_bounds(frame: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows.values(), index=rows, columns=columns)
 
 
-def container_states(policy: str, seed: int) -> Iterator[tuple[int, ContainerEnv]]:
-    """Picks and environment of one container at each of ``STAGES``, unloaded with ``table``."""
-    env = gymnasium.make("unload/Container-v0", physics="table").unwrapped
-    rng = np.random.default_rng([seed, 1])  # not what draws the load
-    observation, info = env.reset(seed=seed)
-    for picks in range(max(STAGES) + 1):
-        if picks in STAGES:
-            yield picks, env
-        if picks < max(STAGES):
-            chosen = UNLOADED_BY[policy](observation[None], info["action_mask"][None], rng)
-            observation, _, _, _, info = env.step(chosen[0])
-
-
 def collect_lifts(lifts: int, seed: int) -> tuple[list[tuple[Load, np.ndarray]], pd.DataFrame]:
     """At least so many lifts, asked of ``table``, with the lifts that ship, and of ``local``.
 
@@ -155,7 +140,12 @@ def collect_lifts(lifts: int, seed: int) -> tuple[list[tuple[Load, np.ndarray]],
         container = len(states) // len(STAGES)
         policy = names[container % len(names)]
         named = {"policy": policy, "seed": seed + container}
-        for picks, env in container_states(policy, seed + container):
+        played = containers(
+            UNLOADED_BY[policy], seed + container, max(STAGES) + 1, (seed + container, 1)
+        )
+        for picks, (env, *_) in enumerate(played):
+            if picks not in STAGES:
+                continue
             table, visible = env.physics, env.visible
             local.reset(table.load)
             for item in np.flatnonzero(~table.present):

@@ -1,4 +1,7 @@
-"""Figures of lifts: of stacks, of a box that tips aside, of jams, and of two ways compared."""
+"""Lifts of a few boxes that notebook 10 looks at, and figures of lifts.
+
+Drawn are lifts of stacks, a box that tips aside, jams, and two ways to lift compared.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,13 +11,87 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Polygon
 
+import unload
+from studies.policies.comparison import front_walls
 from studies.style import styled
 from unload import task
 from unload.load.picture import COLOURS
+from unload.physics.bullet import TIME_STEP, World, slim
+from unload.physics.local import LocalPhysics
+from unload.physics.situation import RESOLUTION, Situation
 
+STICKS_OUT = 100  # μm, more than rounding
 END = 0.5  # m, beyond what any lift moves a box
 CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])  # of a box of size 1
 ON_TOP = {0: "C2", 1: "C0", 2: "C1", 3: "C4"}  # colour by boxes on top; 3 stands for more, too
+
+
+def top_lifts(gap: float, seed: int) -> np.ndarray:
+    """How far each box of a wall's top layer is lifted, in m, where all boxes can move.
+
+    Args:
+        gap: m, by which each box is narrower along x and y.
+        seed: of the load whose foremost wall it is.
+    """
+    wall = front_walls(unload.stack_load(np.random.default_rng(seed)), 1)
+    tops = (wall.positions + wall.sizes / 2)[:, 2]
+    moved = []
+    for number in np.flatnonzero(tops > tops.max() - 0.001):
+        world = World()
+        world.add_box((3.5, 1.25, -0.5), (9, 9, 1), mass=0)  # the floor
+        for y in (-0.5, 3.0):  # the side walls of the container
+            world.add_box((3.5, y, 1.25), (9, 1, 2.5), mass=0)
+        boxes = zip(wall.positions, wall.sizes - (gap, gap, 0))
+        bodies = [world.add_box(place, size, task.MASS) for place, size in boxes]
+        moved.append(world.pull(bodies[number]))
+        world.close()
+    return np.array(moved)
+
+
+def partly_on_top(situation: Situation) -> bool:
+    """Whether exactly one box rests on the chosen one, and sticks out beyond it along y."""
+    if situation.on_top != 1:
+        return False
+    chosen, top = situation.boxes[:2]
+    return bool(abs(top[1]) + top[4] / 2 > chosen[4] / 2 + STICKS_OUT)
+
+
+def hard_situations(loads: int, seed: int) -> list[Situation]:
+    """The distinct situations of ``partly_on_top`` while random loads are unloaded.
+
+    Half of the free boxes are taken away at a time, until no more are left than are visible.
+    """
+    rng, physics = np.random.default_rng(seed), LocalPhysics()
+    found: dict[bytes, Situation] = {}
+    for _ in range(loads):
+        physics.reset(unload.stack_load(rng))
+        while physics.present.sum() > task.N_VISIBLE:
+            present = np.flatnonzero(physics.present).tolist()
+            around = {item: physics.surroundings.situation(item) for item in present}
+            found |= {each.key: each for each in around.values() if partly_on_top(each)}
+            free = [item for item, each in around.items() if each.on_top == 0]
+            for item in rng.choice(free, len(free) // 2 + 1, replace=False):
+                physics.remove(item)
+    return list(found.values())
+
+
+def record(situation: Situation, times: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Lift the chosen box of a situation away from floor and side walls, and note all poses.
+
+    Returns:
+        Sizes (boxes, 2) and poses (times, boxes, 3), as seen from the front: along y and z in m,
+        and the angle about x.
+    """
+    world, boxes, poses = World(), situation.boxes * RESOLUTION, []
+    masses = np.where(np.arange(len(boxes)) < situation.dynamic, task.MASS, 0)
+    bodies = [world.add_box(b[:3], slim(b[3:]), mass) for b, mass in zip(boxes, masses)]
+    # Whole numbers of steps between the moments.
+    for steps in np.diff(np.rint(np.divide(times, TIME_STEP)), prepend=0):
+        world.pull(bodies[0], seconds=steps * TIME_STEP)
+        now = [world.pose(body) for body in bodies]
+        poses.append([(p[1], p[2], 2 * np.arctan2(q[0], q[3])) for p, q in now])
+    world.close()
+    return boxes[:, 4:], np.array(poses)
 
 
 @styled
@@ -67,7 +144,7 @@ def tipping(lifts: Mapping[str, tuple[np.ndarray, np.ndarray]], times: Sequence[
     """Lifts seen from the front, a row each: what moves, and what it stands on.
 
     Args:
-        lifts: by name, sizes and poses as ``few_boxes.record`` gives them.
+        lifts: by name, sizes and poses as ``record`` gives them.
         times: of the poses, in s.
     """
     figure, grid = plt.subplots(len(lifts), len(times), figsize=(10, 2.05 * len(lifts) + 0.3))

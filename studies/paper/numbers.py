@@ -34,15 +34,12 @@ SETTLED = 200  # tuning steps after which noise is measured
 
 
 def table(rows: list[tuple]) -> pd.DataFrame:
-    """Rows as text, see above."""
+    """Rows as text, see above; they end in a bool, a word, or None where nothing is compared."""
     columns = ["number", "where", "paper", "here", "agrees"]
     frame = pd.DataFrame(rows, columns=columns, dtype=object).set_index("number")
-    return frame.assign(agrees=frame["agrees"].map(word), here=frame["here"].astype(str))
-
-
-def word(agrees: bool | str | None) -> str:
-    """What is written of a comparison; None if there is nothing to compare."""
-    return {True: "yes", False: "no", None: ""}.get(agrees, agrees)
+    words = {True: "yes", False: "no", None: ""}
+    agrees = [words.get(agrees, agrees) for agrees in frame["agrees"]]
+    return frame.assign(agrees=agrees, here=frame["here"].astype(str))
 
 
 def constants() -> pd.DataFrame:

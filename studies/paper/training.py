@@ -21,7 +21,7 @@ from studies.results import COMMAND
 from studies.style import COLOURS, WITHOUT_MASK, styled
 from unload import task
 from unload.agent.config import TrainConfig
-from unload.agent.greedy import Greedy, save_policy
+from unload.agent.greedy import save_policy
 from unload.support import files
 
 B2048 = TrainConfig()
@@ -46,8 +46,7 @@ PAPER = Grid(
     },
 )
 DEFAULTS = "paper_b2048_no_mask"  # the cell of ``TrainConfig``'s defaults, of Figs. 11 and 12
-DEFAULT_SEEDS = range(4)  # of its runs that the figures show; the first is the paper's line
-PLAYERS = {0: "paper", 2: "paper_seed_2", 3: "paper_seed_3"}  # policies that play elsewhere
+PLAYERS = {0: "paper", 2: "paper_seed_2", 3: "paper_seed_3"}  # its seeds that play elsewhere
 MASK_LINES = {"with the mask": "-", "without the mask": "--"}  # as everywhere: dashed is without
 SMOOTH = 16  # episodes of all containers, about half a million picks
 
@@ -59,15 +58,10 @@ def training_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
     """
     train_grid(PAPER, cells, n_jobs)
     if cells is None or DEFAULTS in cells:
+        policies = read_policies(paths.DATA / f"{PAPER.name}.safetensors")
         for seed, name in PLAYERS.items():
-            policy = default_policies()[seed]
+            policy = policies[f"{DEFAULTS}/seed_{seed}"]
             save_policy(policy, files.SHIPPED / "policies" / f"{name}.safetensors")
-
-
-def default_policies() -> dict[int, Greedy]:
-    """The policies that ``DEFAULT_SEEDS`` of the paper's configuration have learned."""
-    policies = read_policies(paths.DATA / f"{PAPER.name}.safetensors")
-    return {seed: policies[f"{DEFAULTS}/seed_{seed}"] for seed in DEFAULT_SEEDS}
 
 
 def draw_learning_curve(

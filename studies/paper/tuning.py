@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from studies import paths
 from studies.grid import Cell, Grid, read_grid, train_grid
-from studies.results import COMMAND
+from studies.results import COMMAND, read_table
 from studies.style import COLOURS, styled
 from unload import task
 from unload.agent.config import TrainConfig
@@ -97,11 +97,10 @@ def export_tuning() -> None:
     leave out.
     """
     for fe, kind, batch_size, rate, run in SHOWN:
-        cell = tuning_cell(batch_size, rate, fe == "with")
-        curves = read_grid(TUNING, [cell])
+        run_name = f"{tuning_cell(batch_size, rate, fe == 'with')}/seed_{run}"
         name = f"{kind}_curve_bz_{batch_size}_lr_{rate:g}_agent_{run}.csv"
         column = {"hitrate": "success_rate", "loss": "loss"}[kind]
-        values = curves.loc[curves["seed"] == run, column]
+        values = read_table(TUNING.name)[f"{column} {run_name}"]
         files.write_text(
             paths.DATA / f"dummy_sim_{fe}_hist_equal" / name,
             values.to_csv(

@@ -21,7 +21,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from studies.paper import training
-from studies.policies.scaled import scaled_load
 from studies.policies.variants import GRIDS, RECOMMENDED
 from studies.results import COMMAND, keep_all, publish, read_provenance, read_table
 from studies.statistics import t_interval
@@ -31,12 +30,44 @@ from unload.agent import policies
 from unload.agent.config import TrainConfig
 from unload.agent.evaluation import Policy, evaluate
 from unload.agent.greedy import load_policy, save_policy, settings_of
+from unload.load import substacks
 from unload.load.boxes import Load
 from unload.load.substacks import stack_load
 from unload.network.weights import weights_file
 from unload.physics.bullet import SETTINGS
 from unload.physics.full import FullPhysics
 from unload.support import files
+
+# By scale, how many walls keep the boxes' proportions, and how many rows and columns of substacks
+# fit: boxes × 0.8 leave a gap of 0.5 m at a side wall, boxes × 1.2 one of 0.33 m.
+FITTING = {0.8: (15, 4, 4), 1.2: (10, 3, 3)}
+
+
+def scaled_load(scale: float, rng: np.random.Generator) -> Load:
+    """Draw a load as ``unload.stack_load`` does, with a variant for each substack of each wall.
+
+    Args:
+        scale: of the boxes' widths and heights, one of ``FITTING``.
+        rng: the source of randomness.
+    """
+    walls, rows, columns = FITTING[scale]
+    edges = [left for left, _ in substacks.COLUMNS]
+    kinds = (substacks.LEFT, *[substacks.MID] * (columns - 2), substacks.RIGHT)
+    variants = rng.integers(3, size=(walls, rows, columns))
+    boxes = np.array(
+        [
+            (package, wall, edges[column] + left, substacks.CELLS_HIGH * row + low)
+            for (wall, row, column), variant in np.ndenumerate(variants)
+            for package, left, low in kinds[column][variant]
+        ]
+    )
+    packages, corners = boxes[:, 0], boxes[:, 1:]
+    # In walls and cells, as the corners.
+    sizes = np.insert(substacks.PACKAGES, 0, 1, axis=1)[packages]
+    cell = substacks.CELL * scale
+    units = np.array([task.CONTAINER[0] / walls, cell, cell])
+    return Load((corners + sizes / 2) * units, sizes * units, packages, corners[:, 0])
+
 
 # Of the cards: fresh containers of 500 picks each, of a seed that no other data uses.
 CARD_LOADS, CARD_SEED = 200, 5000
@@ -157,7 +188,7 @@ def comparison_data(n_jobs: int = -1) -> None:
         (case | {"physics": SETTINGS, "weights": weights.get(case["policy"])}, (*case.values(),))
         for case in cases
     ]
-    results = keep_all("comparison", _compared, asked, n_jobs)
+    results = keep_all("comparison", compare, asked, n_jobs)
     tables = {"policies": pd.concat([pd.DataFrame(result.value) for result in results])}
     full = {name: FULL[name] for name in ("episodes", "seed", "max_picks")}
     settings = {"policies": weights, "loads": LOADS, "seed": SEED}
@@ -165,25 +196,16 @@ def comparison_data(n_jobs: int = -1) -> None:
     publish("policies", tables, f"{COMMAND} policies", settings, results)
 
 
-def _compared(*case) -> dict[str, list]:
-    return compare(*case).to_dict("list")
-
-
-def compare(name: str, mask: bool, condition: str) -> pd.DataFrame:
+def compare(name: str, mask: bool, condition: str) -> dict[str, list]:
     """The rows of ``evaluate`` for a policy under a condition.
 
     Returns:
         Its columns, and ``policy``, ``mask``, ``condition`` and ``load`` before them.
     """
     arguments = {"episodes": LOADS, "seed": SEED, "mask": mask} | CONDITIONS[condition]
-    table = evaluate(find_policy(name), **arguments)
+    table = evaluate(SIMPLE.get(name) or load_policy(name), **arguments)
     named = {"policy": name, "mask": mask, "condition": condition, "load": table.index}
-    return pd.concat([pd.DataFrame(named), table], axis=1)
-
-
-def find_policy(name: str) -> Policy:
-    """A rule, or a policy that ships, by its name."""
-    return SIMPLE[name] if name in SIMPLE else load_policy(name)
+    return pd.concat([pd.DataFrame(named), table], axis=1).to_dict("list")
 
 
 def digests() -> dict[str, str]:

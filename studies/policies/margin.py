@@ -32,16 +32,21 @@ def own_scores(network: PEQNetwork, rows: np.ndarray) -> np.ndarray:
 
 
 def containers(
-    policy: Policy, seed: int, max_picks: int = task.MAX_PICKS
+    policy: Policy,
+    seed: int,
+    max_picks: int = task.MAX_PICKS,
+    policy_seed: int | tuple[int, ...] | None = None,
 ) -> Iterator[tuple[ContainerEnv, np.ndarray, int]]:
     """A container as it stands before each pick: environment, (128, 3) observation and action.
 
     Args:
         policy: picks with the mask.
-        seed: of the load and of the policy's random numbers.
+        seed: of the load.
         max_picks: at most; fewer if the container is empty before.
+        policy_seed: of the policy's random numbers, ``seed`` if None.
     """
-    env, rng, ended = ContainerEnv("table", max_picks=max_picks), np.random.default_rng(seed), False
+    rng = np.random.default_rng(seed if policy_seed is None else policy_seed)
+    env, ended = ContainerEnv("table", max_picks=max_picks), False
     observation, info = env.reset(seed=seed)
     while not ended:
         action = int(policy(observation[None], info["action_mask"][None], rng)[0])

@@ -9,16 +9,12 @@ too, and so is the paper's beside them.
 
 from dataclasses import replace
 from functools import partial
-from itertools import product
-
-import pandas as pd
-from scipy import stats
 
 from studies.changes import height_reward
 from studies.falls import measures
 from studies.grid import Cell, Grid, train_grid
 from studies.networks import NETWORKS as KINDS
-from studies.results import COMMAND, read_table
+from studies.results import COMMAND
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.support import files
@@ -29,7 +25,6 @@ SMALL = TrainConfig(picks=320_000, batch_size=64, n_features=32, log_interval=50
 LOADS = {"episodes": 200, "seed": 1000}  # fresh containers for each trained policy
 SHARES = (0.25, 0.5, 0.9)  # of the height in the reward
 RECOMMENDED = TrainConfig(picks=1_000_000, equalize=False, log_interval=500)
-APPLIED = {"msr_mask": "with the mask", "msr_no_mask": "without the mask"}
 
 
 def judged(policy: Greedy, config: TrainConfig) -> dict[str, float]:
@@ -44,16 +39,13 @@ NETWORKS = {
     name: Cell(replace(SMALL, network=kind), SEEDS)
     for name, kind in {"peq": "peq", **KINDS}.items()
 }
-CONTROL = {"unchanged": Cell(CONFIG, SEEDS)}
 # The paper's outlook: failing at a higher item is less bad.
-REWARDS = {
+REWARDS = {"unchanged": Cell(CONFIG, SEEDS)} | {
     f"height_{share}": Cell(CONFIG, SEEDS, partial(height_reward, share=share)) for share in SHARES
 }
-# What is shown together.
-PARTS = {"networks": NETWORKS, "rewards": CONTROL | REWARDS}
 _grid = partial(Grid, command=f"{COMMAND} variants", measure=judged)
 GRIDS = {
-    "variants": _grid("variants", cells=NETWORKS | CONTROL | REWARDS),
+    "variants": _grid("variants", cells=NETWORKS | REWARDS),
     # The paper's configuration but for one thing, and shorter: positions, not ranks.
     "recommended": _grid("recommended", cells={"positions": Cell(RECOMMENDED, range(5))}),
 }
@@ -68,25 +60,3 @@ def variants_data(n_jobs: int = -1) -> None:
     kept = train_grid(GRIDS["recommended"], n_jobs=n_jobs)
     best = load_policy(kept / "positions/seed_0/policy.safetensors")
     save_policy(best, files.SHIPPED / "policies/recommended.safetensors")
-
-
-def read_variants(part: str) -> pd.DataFrame:
-    """What ``judged`` says of the policies of one of ``PARTS``, a row per ``cell`` and ``seed``."""
-    rows = read_table(GRIDS["variants"].name)
-    return rows[rows["cell"].isin(PARTS[part])]
-
-
-def differences(part: str) -> pd.DataFrame:
-    """Differences of the cells' mean MSR from that of the first one, with their 95 % intervals.
-
-    Returns:
-        A row per cell and entry of ``APPLIED``: ``difference``, ``low`` and ``high`` by Welch's t,
-        in points.
-    """
-    cells = dict(list(read_variants(part).groupby("cell", sort=False)))
-    reference, rows = cells.pop(next(iter(cells))), {}
-    for (name, cell), column in product(cells.items(), APPLIED):
-        test = stats.ttest_ind(cell[column], reference[column], equal_var=False)
-        difference = cell[column].mean() - reference[column].mean()
-        rows[name, APPLIED[column]] = (difference, *test.confidence_interval())
-    return 100 * pd.DataFrame(rows, index=["difference", "low", "high"]).T

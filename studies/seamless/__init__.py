@@ -1,6 +1,6 @@
-"""Seamless walls: how many free boxes jam in them, and how the paper's agent trains there.
+"""Seamless walls: how the paper's agent trains where a share of the free boxes jams.
 
-Read ``jams`` (measured with PyBullet), ``episodes`` (jams while a policy unloads), ``jam_tables``
-(what is published of both), ``mujoco_jams`` (the same with another engine), ``jamming`` (a jam in a
-training run) and ``training`` (the runs), in this order.
+Read ``jamming`` (a jam in a training run) before ``training`` (the runs). How many boxes jam was
+measured with PyBullet and MuJoCo; the tables stand in ``data/seamless/``, and its provenance says
+where the program does.
 """

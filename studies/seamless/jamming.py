@@ -64,7 +64,7 @@ def jam(run: Training, share: float, lasts: int = 0) -> None:
 
 
 def jam_by_place(run: Training, shares: np.ndarray, lasts: int) -> None:
-    """Let free boxes jam as often as was measured where they stand, see ``jams.place``.
+    """Let free boxes jam as often as was measured where they stand.
 
     Args:
         run: as in ``jam``.

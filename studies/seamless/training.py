@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 
 from studies import changes
-from studies.grid import Cell, Grid, cell, read_grid, train_grid
-from studies.results import COMMAND, write_table
+from studies.grid import Cell, Grid, cell, train_grid
+from studies.results import COMMAND, read_table, write_table
 from studies.seamless.jamming import jam, jam_by_place, weigh
 from unload import task
 from unload.agent.checkpoint import RunFolder, settings_of_run
@@ -31,13 +31,13 @@ ORDER, AVERAGED = replace(NOISE, position_noise=0.0), replace(NOISE, ties="avera
 TIES = {"order": ORDER, "noise": NOISE, "averaged": AVERAGED}
 ANEW = partial(jam, share=SHARE)
 # Share of the free boxes that jam along episodes by the friction of a contact, by whether a box
-# stands in front, and by the number of those at the sides (``jam_tables.first_attempts``), when
-# 17 of 20 episodes had been played.
+# stands in front, and by the number of those at the sides (``seamless/jam_first``), when 17 of 20
+# episodes had been played.
 BY_PLACE = {
     0.64: np.array(((0.0, 0.05, 0.15, 0.52), (0.0, 0.12, 0.5, 0.68))),
     1.0: np.array(((0.01, 0.13, 0.47, 0.78), (0.04, 0.38, 0.83, 0.98))),
 }
-LASTS = 20  # successes of others within which a jam is drawn again, see ``jam_tables.again``
+LASTS = 20  # successes of others within which a jam is drawn again, see ``seamless/jam_again``
 UNTIL_SUCCESS, WEIGHT_1 = partial(jam, share=SHARE, lasts=1), partial(weigh, z=1.0)
 CELLS: dict[str, Cell] = {
     **{
@@ -94,11 +94,11 @@ def export(wall_time: Sequence[float]) -> None:
         wall_time: of each point of its curve, s since the epoch.
     """
     name, seed = EXPORTED
-    curves = read_grid(SEAMLESS, [name])
-    curve = curves[curves["seed"] == seed].reset_index(drop=True)
+    table = read_table(SEAMLESS.name)
+    loss, msr = (table[f"{column} {name}/seed_{seed}"] for column in ("loss", "success_rate"))
     for exported, values in (
-        ("loss_function_agent", curve["loss"]),
-        ("total_rew_function_agent", (2 * curve["success_rate"] - 1) * task.MAX_PICKS),
+        ("loss_function_agent", loss),
+        ("total_rew_function_agent", (2 * msr - 1) * task.MAX_PICKS),
     ):
-        table = pd.DataFrame({"Wall time": wall_time, "Step": curve["picks"], "Value": values})
-        write_table(exported, table.dropna(), "%.12g")
+        columns = {"Wall time": wall_time, "Step": table["picks"], "Value": values}
+        write_table(exported, pd.DataFrame(columns).dropna(), "%.12g")

@@ -1,5 +1,5 @@
 """How fast the parts are.
 
 ``run`` measures whole trainings, ours and Stable-Baselines3's, and prints all speeds with those of
-``parts``; ``figures`` draws them.
+``parts``, which also draws them.
 """

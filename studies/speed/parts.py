@@ -1,15 +1,19 @@
-"""What the parts take: lifts and picks per second, milliseconds per update; and their table."""
+"""What the parts take: lifts and picks per second, milliseconds per update; figures of speed."""
 
-import time
+import timeit
 from collections.abc import Callable, Mapping
 from unittest import mock
 
 import gymnasium
+import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 import torch
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
+from matplotlib.figure import Figure
 
 import unload
+from studies.style import styled
 from unload import task
 from unload.agent import learner
 from unload.physics.full import FullPhysics
@@ -17,10 +21,11 @@ from unload.physics.local import LocalPhysics
 from unload.physics.table import TablePhysics
 
 CONTAINER = "unload/Container-v0"
-ROUNDS = 4  # in which each call is timed
+ROUNDS = 4  # of each call that are timed
 LIFTS = {"full": 2, "local": 100, "table": 100}  # of a round; each of full takes seconds
 NUM_ENVS, PICKS = task.NUM_ENVS, task.MAX_PICKS  # of the containers that are many; of an episode
 BATCH_SIZE, N_FEATURES = 2048, 64  # of an update
+CACHES = 1, 10  # MB that a processor's caches hold
 
 
 def three_digits(value: float) -> str:
@@ -29,21 +34,14 @@ def three_digits(value: float) -> str:
 
 
 def best_times(calls: Mapping[str, Callable[[], object]]) -> dict[str, float]:
-    """The least wall time of each call, in s.
+    """The least wall time of each call, in s; the first of a round does not count.
 
-    Each is made once without counting. Then all are made in turn, ``ROUNDS`` times, so that
-    whatever else the machine does meets all of them alike. The least time is that of the
-    round which was disturbed least.
+    The least time is that of the call which was disturbed least.
     """
-    for call in calls.values():
-        call()
-    best = dict.fromkeys(calls, float("inf"))
-    for _ in range(ROUNDS):
-        for name, call in calls.items():
-            start = time.perf_counter()
-            call()
-            best[name] = min(best[name], time.perf_counter() - start)
-    return best
+    return {
+        name: min(timeit.repeat(call, number=1, repeat=1 + ROUNDS)[1:])
+        for name, call in calls.items()
+    }
 
 
 def lift_rates(load: unload.Load) -> dict[str, float]:
@@ -143,3 +141,46 @@ def update_times() -> dict[str, float]:
     )
     torch.set_num_threads(1)
     return {name: seconds * 1e3 for name, seconds in times.items()}
+
+
+@styled
+def layers(samples: int, n_features: int) -> Figure:
+    """What each layer of an update by PyTorch stores of so many samples, in MB."""
+    numbers = {
+        "observations": 3,
+        "features": n_features,
+        "after the ReLU": n_features,
+        "beside the pooled ones": 4 * n_features,
+        "values": 1,
+    }
+    megabytes = pd.Series(numbers) * samples * task.N_VISIBLE * 4 / 1e6
+    figure, axes = plt.subplots(figsize=(5.6, 2.4))
+    bars = axes.barh(list(numbers), megabytes)
+    axes.bar_label(bars, [f" {each:.3g}" for each in megabytes])
+    axes.set(xscale="log", xlabel="MB", xlim=(1e-3, 1e4), title=f"{megabytes.sum():.3g} MB in all")
+    axes.axvspan(*CACHES, color="0.9", zorder=0)
+    return figure
+
+
+@styled
+def benchmarks(table: pd.DataFrame) -> Figure:
+    """The rows of ``data/speeds.csv`` as bars: a panel a kind, beside the first way of its kind."""
+    groups = table.groupby("what", sort=False)
+    sizes = [len(group) for _, group in groups]
+    figure, panels = plt.subplots(
+        len(sizes), 1, figsize=(6.4, 0.34 * sum(sizes) + 0.5 * len(sizes)), sharex=True,
+        height_ratios=[size + 0.6 for size in sizes],
+    )  # fmt: skip
+    for number, (axes, (what, group)) in enumerate(zip(panels, groups)):
+        axes.barh(range(len(group)), group["ratio"], color=f"C{number}")
+        for place, row in enumerate(group.itertuples()):
+            text = f"{three_digits(row.value)} {row.unit}"
+            axes.text(max(row.ratio, 1) * 1.15, place, text, va="center", fontsize=8)
+        axes.set_yticks(range(len(group)), group["how"], fontsize=8)
+        axes.set(xscale="log", ylim=(len(group) - 0.4, -0.6))
+        axes.set(xlim=(0.5, 20 * table["ratio"].max()))
+        axes.set_title(what, loc="left", fontsize=9)
+        axes.minorticks_off()
+        axes.grid(False, axis="y")
+    axes.set_xlabel("times as fast as the first way of its kind")
+    return figure

@@ -120,16 +120,11 @@ def speeds() -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def show(table: pd.DataFrame) -> None:
-    """Print the speeds, and their ratios to the first of each kind."""
-    numbers = {"value": three_digits, "ratio": lambda ratio: f"{three_digits(ratio)} ×"}
-    print(table.to_string(index=False, formatters=numbers))
-
-
 def main() -> None:
     torch.set_num_threads(1)
     result = measured(speeds)
-    show(result.value)
+    numbers = {"value": three_digits, "ratio": lambda ratio: f"{three_digits(ratio)} ×"}
+    print(result.value.to_string(index=False, formatters=numbers))
     settings = {"date": date.today().isoformat(), "stable-baselines3": version("stable-baselines3")}
     publish("speeds", {"speeds": result.value}, COMMAND, settings, [result])
 

@@ -8,7 +8,7 @@ by from the noise that it learns from, and takes the mask in training apart. The
 ``data/ties/PLAN.md`` says what was expected.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -17,13 +17,12 @@ import numpy as np
 import pandas as pd
 import torch
 
-from studies import paths
 from studies.changes import repeated, without
 from studies.falls.cells import CONFIG
 from studies.falls.laboratory import SLOPES, TILTS, keep_cells, point, train_in_laboratory
-from studies.falls.long import LONG, UNTRAINED
+from studies.falls.long import LONG, published_networks
 from studies.fingerprint import training_fingerprint
-from studies.grid import Cell, cell, cell_of, read_policies
+from studies.grid import Cell, cell, cell_of
 from studies.paper.training import PAPER
 from studies.results import COMMAND, code_of, keep_all, publish
 from studies.statistics import end_msr
@@ -36,8 +35,6 @@ from unload.agent.training import Training
 from unload.env.equalization import equalize
 from unload.env.observation import POSITION_NOISE
 from unload.env.vector import ContainerVectorEnv
-from unload.network.peq import PEQNetwork
-from unload.support import checks
 
 NOISE = ("frozen", "anew")  # for a load, or at each pick
 WAYS = list(product(NOISE, (False, True)))  # noise and mask
@@ -66,7 +63,6 @@ def evaluate_choice(
         since the last success, and of the others those by ``preference``: the network chooses an
         item that cannot be lifted also where ties share their mean rank.
     """
-    checks.one_of("noise", noise, NOISE)
     seeds = np.random.SeedSequence(seed).generate_state(episodes).tolist()
     envs = ContainerVectorEnv(episodes, position_noise=POSITION_NOISE if noise == "frozen" else 0.0)
     rng, rows = np.random.default_rng(seed), np.arange(episodes)
@@ -100,29 +96,25 @@ def evaluate_choice(
     return counts | {"msr": counts["msr"] / (episodes * task.MAX_PICKS)}
 
 
-def published_networks() -> dict[str, Greedy]:
+def networks() -> dict[str, Greedy]:
     """All published networks that were trained without jams, and some that were not trained."""
-    policies = {
-        name: policy
-        for grid in (PAPER, LONG, TIES)
-        for name, policy in read_policies(paths.DATA / f"{grid.name}.safetensors").items()
-        if "jams" not in name
-    }
-    for seed in range(UNTRAINED):
-        network = PEQNetwork(generator=torch.Generator().manual_seed(seed))
-        policies[f"untrained/seed_{seed}"] = Greedy(network, equalize=True)
-    return policies
+    every = published_networks((PAPER, LONG, TIES))
+    return {name: policy for name, policy in every.items() if "jams" not in name}
 
 
 def ask_network(name: str, policy: Greedy) -> list[dict]:
     """Rows of ``ties/choice.csv``: a network, with noise, mask and place in all ways."""
     torch.set_num_threads(1)
     named = {"cell": cell_of(name), "seed": int(name.rpartition("_")[2])}
+    return [named | row for row in ask(policy, **LOADS, places=(True, False))]
+
+
+def ask(policy: Greedy, episodes: int, seed: int, places: Sequence[bool] = (True,)) -> list[dict]:
+    """``noise``, ``mask``, ``place`` and what ``evaluate_choice`` says, in all ways to ask."""
     return [
-        named
-        | {"noise": noise, "mask": mask, "place": place}
-        | evaluate_choice(policy, noise, mask, place, **LOADS)
-        for (noise, mask), place in product(WAYS, (True, False))
+        {"noise": noise, "mask": mask, "place": place}
+        | evaluate_choice(policy, noise, mask, place, episodes, seed)
+        for (noise, mask), place in product(WAYS, places)
     ]
 
 
@@ -197,9 +189,8 @@ def run_laboratory(name: str, planned: Cell, seed: int) -> dict:
     run = train_in_laboratory(config, planned.change, lambda run: trace.append(point(run)))
     points, policy = pd.DataFrame(trace), run.policy()
     row = {"cell": name, "seed": seed, "end": end_msr(run.curve.table())}
-    for noise, mask in WAYS:
-        choices = evaluate_choice(policy, noise, mask, **FEW_LOADS)
-        row[f"{noise}_{'mask' if mask else 'no_mask'}"] = choices["msr"]
+    for choices in ask(policy, **FEW_LOADS):
+        row[f"{choices['noise']}_{'mask' if choices['mask'] else 'no_mask'}"] = choices["msr"]
     row |= points[SLOPES].iloc[-1].to_dict() | points[TILTS].mean().to_dict()
     return row | {"tilt": float(points[TILTS].abs().mean().max())}
 
@@ -207,7 +198,7 @@ def run_laboratory(name: str, planned: Cell, seed: int) -> dict:
 def choice_data(n_jobs: int = -1) -> None:
     """Write ``ties/choice.csv``: a row per network and way to ask it, see ``evaluate_choice``."""
     fingerprint, questions = training_fingerprint(), []
-    for name, policy in published_networks().items():
+    for name, policy in networks().items():
         question = {"name": name, "weights": code_of(policy.network), "fingerprint": fingerprint}
         questions.append((question | LOADS, (name, policy)))
     results = keep_all("ties/choice", ask_network, questions, n_jobs)

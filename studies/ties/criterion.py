@@ -6,15 +6,7 @@
 import numpy as np
 import pandas as pd
 
-from studies.statistics import (
-    END,
-    WINDOW_PICKS,
-    end_msr,
-    fell,
-    steady,
-    window_numbers,
-    windows,
-)
+from studies.statistics import END, WINDOW_PICKS, end_msr, fell, steady, window_numbers, windows
 
 STARTS = (0.125, 0.175)  # MSR over the first episode: the paper's mean reward of −0.7
 ENDS = (0.55, 0.65)  # MSR over the last tenth: "around 0.2"

@@ -1,25 +1,28 @@
-"""Where runs end, by how ties are broken and how long an order of equals lasts; single runs."""
+"""What came out, in one figure: the README's; and what ties do.
 
-from collections.abc import Callable, Mapping
+How long an order of equals lasts; where runs end, by how ties are broken; single runs.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import EngFormatter
+from matplotlib.ticker import EngFormatter, ScalarFormatter
 
 from studies.falls.long import LONG
 from studies.grid import Grid, read_grid
-from studies.paper.training import PAPER
+from studies.paper.training import PAPER, SMOOTH
+from studies.results import read_table
 from studies.statistics import PAPER_MSR, PAPER_START, WINDOW_PICKS, by_run, windows
 from studies.style import COLOURS, WITHOUT_MASK, styled
-from studies.ties.choice import COUNTS, WAYS, evaluate_choice
+from studies.ties.choice import COUNTS, WAYS
 from studies.ties.criterion import WORDS, likeness, open_course
-from studies.ties.earlier import EARLIER
 from studies.ties.laboratory import RHOS
-from studies.ties.training import SWEPT, TIES
-from unload.agent.greedy import Greedy
+from studies.ties.training import EARLIER, SWEPT, TIES
+from unload.physics.bullet import GAP
 
 PICKS = 20_000_000  # of a run
 # How ties are broken, in the order of the figure, and the cells of b = 256 that do so, without
@@ -34,8 +37,69 @@ KINDS: dict[str, list[tuple[Grid, str]]] = {
     "noise,\nfrozen": [(PAPER, "paper"), (LONG, "ranks"), (TIES, "frozen")],
 }
 
+# How a line is drawn by the batch, here and in the legend.
+BATCHES = {2048: "-", 256: (0, (4, 1.5))}
+# The cells of the paper's configuration by whether the mask is on in training, and by batch.
+TRAINED = {
+    "no mask": {2048: "paper_b2048_no_mask", 256: "paper_no_mask"},
+    "mask": {2048: "paper_b2048_mask", 256: "paper_mask"},
+}
+TRAINING_COLOURS = {"no mask": WITHOUT_MASK, "mask": COLOURS["ranks"]}
+# How the same agents choose afterwards: the rows of ``ties/choice.csv``, and the marker.
+ASKED = {
+    "without the mask": ({"mask": False, "place": True}, "o", "none"),
+    "with the mask": ({"mask": True, "place": True}, "o", "full"),
+    "by height alone": ({"mask": True, "place": False}, "^", "full"),
+}
+
 # What becomes of a pick, from the left, and its colour.
 OUTCOMES = {"unloaded": "#4c9f70", "deadlocked": "0.25", "preference": "C1", "noise": "C0"}
+
+
+def durations(table: pd.DataFrame) -> pd.DataFrame:
+    """How long the order of equals lasts in PyBullet worlds that go on.
+
+    Args:
+        table: ``ties/noise``. It has a row per world, moment, lag in picks and axis. Of the boxes
+            that nobody touches and that share their place along the axis, within a wall, with
+            others: how many ``boxes`` there are; ``rms``, how far they move along it meanwhile, in
+            mm, without the mean of their group; ``spearman``, the mean rank correlation of their
+            offsets then and later.
+
+    Returns:
+        Means of these measures with the package's gap, by ``walls``, ``axis`` and ``lag``.
+    """
+    usual = table[table["gap"] == GAP]
+    return usual.groupby(["walls", "axis", "lag"])[["boxes", "rms", "spearman"]].mean()
+
+
+@styled
+def draw_durations(table: pd.DataFrame, drift: Sequence[float]) -> Figure:
+    """How long the order among equals lasts, by axis, beside noise that drifts.
+
+    Args:
+        table: see ``durations``.
+        drift: of this noise, the correlation from one pick to the next along x, y and z.
+    """
+    figure, panels = plt.subplots(1, 3, figsize=(8.4, 3), sharey=True)
+    found, lags = durations(table)["spearman"], np.unique(table["lag"])
+    every = np.arange(1, lags[-1] + 1)
+    for axes, axis, correlation in zip(panels, "xyz", drift):
+        for walls, marker, label in ((3, "o-", "three walls"), (12, "s-", "a whole container")):
+            measured = found[walls, axis]
+            hollow = None if walls == 3 else "none"
+            axes.plot(measured.index, measured, marker, color="0.25", mfc=hollow, ms=4, label=label)
+        drifting = correlation**every
+        axes.plot(every, drifting, "--", color=COLOURS["ranks"], label="drifting noise")
+        axes.axhline(0, color="0.6", linewidth=0.8)
+        axes.set(title=f"along {axis}; drift: ρ = {correlation:g}", ylim=(-0.2, 1.05))
+        axes.set(xscale="log", xticks=lags[::2])
+        axes.xaxis.set_major_formatter(ScalarFormatter())
+        axes.minorticks_off()
+    panels[0].set_ylabel("rank correlation")
+    panels[1].set_xlabel("picks in between")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
 
 
 def read_by_ties() -> pd.DataFrame:
@@ -173,28 +237,13 @@ def draw_duration(runs: pd.DataFrame, long: pd.DataFrame) -> Figure:
     return figure
 
 
-def ask(policy: Greedy, episodes: int, seed: int) -> pd.DataFrame:
-    """Let a network choose in fresh containers in all four ways.
-
-    Args:
-        policy, episodes, seed: see ``evaluate_choice``.
-
-    Returns:
-        A row for each of ``WAYS``, as in ``ties/choice``.
-    """
-    rows = []
-    for noise, mask in WAYS:
-        counts = evaluate_choice(policy, noise, mask, episodes=episodes, seed=seed)
-        rows.append({"noise": noise, "mask": mask} | counts)
-    return pd.DataFrame(rows)
-
-
 @styled
 def draw_ways(groups: Mapping[str, pd.DataFrame]) -> Figure:
     """What becomes of the picks of some networks, in each of the four ways to ask them.
 
     Args:
-        groups: by the title of a panel, rows as those of ``ask``, of one network or of several.
+        groups: by the title of a panel, rows as ``choice.ask`` gives them, of one network or of
+            several.
     """
     across = min(len(groups), 3)
     down = -(-len(groups) // across)
@@ -217,7 +266,11 @@ def draw_ways(groups: Mapping[str, pd.DataFrame]) -> Figure:
                 start += share
             axes.text(2, place, f"{counts['msr']:.0%}", va="center", color="white", fontsize=9)
         axes.set(title=title, xlim=(0, 100), ylim=(len(WAYS) - 0.5, -0.5))
-        axes.set_yticks(range(len(WAYS)), [_way(*way) for way in WAYS], fontsize=9)
+        axes.set_yticks(
+            range(len(WAYS)),
+            [f"{noise}, {'mask' if mask else 'no mask'}" for noise, mask in WAYS],
+            fontsize=9,
+        )
         axes.grid(axis="y", visible=False)
     for axes in panels[len(groups) :]:
         axes.set_axis_off()
@@ -228,5 +281,82 @@ def draw_ways(groups: Mapping[str, pd.DataFrame]) -> Figure:
     return figure
 
 
-def _way(noise: str, mask: bool) -> str:
-    return f"{noise}, {'mask' if mask else 'no mask'}"
+@styled
+def draw_answer() -> Figure:
+    """Learning curves by how agents are trained, and the same agents in new containers.
+
+    Strong lines are means over the runs of a batch, thin ones running means of single runs over
+    half a million picks; the last panel has a marker per agent.
+    """
+    curves, choices = read_grid(PAPER), read_table("ties/choice")
+    widths = {"width_ratios": [1, 1, 1, 1.25]}
+    figure, panels = plt.subplots(1, 4, figsize=(12.4, 3.9), sharey=True, gridspec_kw=widths)
+    for axes, (name, title) in zip(
+        panels,
+        {
+            "no mask": "1  Trained as in the paper,\n    without the mask",
+            "mask": "2  Trained with the mask:\n    up, then down",
+        }.items(),
+    ):
+        colour = TRAINING_COLOURS[name]
+        for batch, cell in TRAINED[name].items():
+            runs = _draw_runs(axes, curves, cell, colour, BATCHES[batch])
+            label = f"batch {batch} ({runs} agents)"
+            axes.plot([], [], c=colour, ls=BATCHES[batch], lw=2.2, label=label)
+        stars = {"ms": 11, "zorder": 5, "label": "the paper", "clip_on": False}
+        axes.plot([0, 20], [100 * PAPER_START, 100 * PAPER_MSR], "k*", **stars)
+        axes.set_title(title, loc="left")
+        axes.legend(loc="lower right", fontsize=8)
+    positions = [_draw_runs(panels[2], curves, f"positions_{mask}", COLOURS["positions"], "-")
+                 for mask in ("mask", "no_mask")]  # fmt: skip
+    panels[2].plot(
+        [], [], c=COLOURS["positions"], lw=2.2, label=f"batch 256 ({sum(positions)} agents)"
+    )
+    panels[2].set_title("3  Positions\n    instead of ranks", loc="left")
+    panels[2].legend(loc="lower right", fontsize=8)
+    for axes in panels[:3]:
+        axes.set(xlim=(0, 20), xticks=range(0, 21, 5), xlabel="million picks of training")
+    panels[0].set(ylim=(0, 103), ylabel="successful picks (%)")
+    _draw_choices(panels[3], choices)
+    look = {"ncols": 3, "fontsize": 8, "title_fontsize": 8, "handletextpad": 0.2}
+    title = "how the agents of panel 4 choose"
+    handles = panels[3].get_legend_handles_labels()
+    figure.legend(*handles, loc="outside lower right", title=title, **look)
+    return figure
+
+
+def _draw_runs(axes: Axes, curves: pd.DataFrame, cell: str, colour: str, line) -> int:
+    """Draw all runs of a cell, pale below their mean, and return how many they are."""
+    smooth = [
+        pd.Series(100 * run["success_rate"].rolling(SMOOTH, min_periods=1).mean().to_numpy(),
+                  run["picks"] / 1e6)
+        for _, run in curves[curves["cell"] == cell].groupby("seed")
+    ]  # fmt: skip
+    for run in smooth:
+        axes.plot(run, color=colour, linewidth=0.7, alpha=0.35)
+    axes.plot(pd.concat(smooth, axis=1).mean(axis=1), color=colour, linestyle=line, linewidth=2.2)
+    return len(smooth)
+
+
+def _draw_choices(axes: Axes, choices: pd.DataFrame) -> None:
+    """A marker per agent in new containers, by how it was trained and by how it chooses."""
+    frozen = choices[choices["noise"] == "frozen"]
+    names, column = [], 0
+    for name, cells in TRAINED.items():
+        for batch, cell in cells.items():
+            rows = frozen[frozen["cell"] == cell]
+            for shift, (label, (way, marker, fill)) in zip((-0.27, 0, 0.27), ASKED.items()):
+                chosen = rows[(rows[list(way)] == pd.Series(way)).all(axis=1)]
+                # Side by side within their place, so that equal ones can be counted.
+                places = column + shift + np.linspace(-0.09, 0.09, len(chosen))
+                # Dark, because pale markers would be lost.
+                dark = "0.35" if name == "no mask" else TRAINING_COLOURS[name]
+                look = {"ms": 3.5, "fillstyle": fill, "c": dark, "clip_on": False}
+                label = label if column == 0 else None
+                axes.plot(places, 100 * chosen["msr"], marker, **look, label=label)
+            names.append(f"{name}\n{batch}")
+            column += 1
+    axes.set_xticks(range(column), names)
+    axes.set(xlabel="how they were trained, and the batch", xlim=(-0.5, column - 0.5))
+    axes.set_title("4  The same agents afterwards,\n    in new containers", loc="left")
+    axes.grid(axis="x", visible=False)

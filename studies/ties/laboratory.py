@@ -12,8 +12,7 @@ from functools import partial
 from studies.falls.cells import CONFIG
 from studies.falls.laboratory import keep_cells, publish_cells
 from studies.grid import cell
-from studies.ties.noise import drifting
-from studies.ties.renewed import renewed
+from studies.ties.noise import drifting, renewed
 
 RHOS = (0.0, 0.8, 0.9, 0.965, 0.985, 0.997, 1.0)
 # The plan's seeds, and those of its deviation 10.

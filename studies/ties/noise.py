@@ -9,18 +9,23 @@ each pick, and with ρ = 1 it is frozen, as it is in the environments.
 
 from collections.abc import Sequence
 
-import numba
 import numpy as np
+from scipy.stats import spearmanr
 
 from unload import task
 from unload.agent.training import Training
-from unload.env.observation import POSITION_NOISE
+from unload.env.equalization import equalize
+from unload.env.observation import POSITION_NOISE, drift, nearest, scale
+from unload.load.boxes import ABOVE
+from unload.load.substacks import stack_load
 
 # Standard deviation of the offsets on each axis in scaled coordinates. Ranks depend on their
 # order alone, as long as they are small beside the 3.5 cm between the places of the paper's loads.
 SPREAD = 2 * POSITION_NOISE / task.CONTAINER
+# Equalized coordinates by rank. ``unload.equalize`` ranks exactly equal positions otherwise.
+LEVELS = np.linspace(-1, 1, task.N_VISIBLE, dtype=np.float32)[None, None]
+HOW_BROKEN = {"order": 0.0, "noise": POSITION_NOISE}  # m
 MOST_ITEMS = 1100  # for which the environments make room, where a load has up to 1,000
-LEVELS = ((2 * np.arange(task.N_VISIBLE) - task.N_VISIBLE + 1) / (task.N_VISIBLE - 1)).astype("f4")
 
 
 class DriftingTies:
@@ -67,32 +72,13 @@ class DriftingTies:
             room = state.present.shape[1]
             self.offsets[:, :room] = rng.standard_normal((config.num_envs, room, 3), np.float32)
         fresh = rng.standard_normal((config.num_envs, task.N_VISIBLE, 3), np.float32)
-        positions = np.empty(state.values.shape)
-        _move(self.offsets, state.visible, fresh, self._kept, self._drawn, state.values, positions)
-        seen = np.empty((config.num_envs, task.N_VISIBLE, 3), np.float32)
-        _write(np.argsort(positions, axis=2), seen)
+        rows = np.arange(config.num_envs)[:, None]
+        moved = self._kept * self.offsets[rows, state.visible] + self._drawn * fresh
+        self.offsets[rows, state.visible] = moved
+        order = np.argsort(state.values + (SPREAD * moved).transpose(0, 2, 1), axis=2)
+        seen = np.empty(moved.shape, np.float32)
+        np.put_along_axis(seen.transpose(0, 2, 1), order, LEVELS, axis=2)
         return seen
-
-
-@numba.njit(cache=True)
-def _move(offsets, visible, fresh, kept, drawn, values, positions):
-    """Move the offsets of the visible items, and fill ``positions`` (envs, axes, rows)."""
-    for env in range(visible.shape[0]):
-        for row in range(visible.shape[1]):
-            item = visible[env, row]
-            for axis in range(3):
-                offset = kept[axis] * offsets[env, item, axis] + drawn[axis] * fresh[env, row, axis]
-                offsets[env, item, axis] = offset
-                positions[env, axis, row] = values[env, axis, row] + SPREAD[axis] * offset
-
-
-@numba.njit(cache=True)
-def _write(order, seen):
-    """Write the equalized coordinates of rows whose ``order`` (envs, axes, rows) is known."""
-    for env in range(order.shape[0]):
-        for axis in range(3):
-            for rank in range(order.shape[2]):
-                seen[env, order[env, axis, rank], axis] = LEVELS[rank]
 
 
 def drifting(
@@ -119,3 +105,68 @@ def drifting(
 
     run.agent.choose = choose_by_ties
     run.replay.add = lambda observations, **rest: add(observations=seen, **rest)
+
+
+def renewed(run: Training, correlation: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+    """Let ties be broken by noise that lasts until a success, in choosing and in learning alike.
+
+    The paper says that "the observation vector remains the same" after a failed pick. Noise that
+    goes on at every pick contradicts this; noise that goes on while boxes leave does not.
+
+    Args:
+        run: see ``drifting``, with γ = 0. What its containers show is kept in ``seen``,
+            (num_envs, 128, 3) float32, and whether their last pick has failed in ``failed``,
+            (num_envs,) bool; both are parts of its state.
+        correlation: ρ along x, y and z from one success to the next; 0 draws the noise anew.
+    """
+    ties, num_envs = DriftingTies(run, correlation), run.config.num_envs
+    choose, add = run.agent.choose, run.replay.add
+    run.kept["seen"] = np.zeros((num_envs, task.N_VISIBLE, 3), np.float32)
+    run.kept["failed"] = np.zeros(num_envs, bool)
+
+    def choose_by_ties(observations: np.ndarray, *rest) -> np.ndarray:
+        refilled = run.rollout.steps % run.config.max_picks == 0
+        same = run.kept["failed"] & (not refilled)
+        before = ties.offsets[same]
+        fresh = ties.observations()
+        ties.offsets[same] = before
+        run.kept["seen"] = np.where(same[:, None, None], run.kept["seen"], fresh)
+        return choose(run.kept["seen"], *rest)
+
+    def add_as_seen(observations: np.ndarray, rewards: np.ndarray, **rest) -> None:
+        run.kept["failed"] = rewards <= 0
+        add(observations=run.kept["seen"], rewards=rewards, **rest)
+
+    run.agent.choose, run.replay.add = choose_by_ties, add_as_seen
+
+
+def told_by_rank(load_seed: int, ties: str) -> dict:
+    """How far the rank along x tells the height in a full load, by how ties are broken.
+
+    Rows are sorted nearest first, so that the items' order is height. ``ties/leak`` says what
+    networks of jams by order, with the paper's batch, do of it: a row for each network, way to
+    break ties, and mask, with its ``msr`` in fresh containers without jams.
+
+    Returns:
+        ``spearman``, the mean rank correlation of the ranks along x and z of the visible boxes of
+        a wall; ``pairs`` of a visible box and a visible one that lies on it, and of those the
+        number in which the ``upper`` one has the lower rank along x.
+    """
+    rng = np.random.default_rng(load_seed)
+    load = stack_load(rng)
+    positions = load.positions + drift(len(load), HOW_BROKEN[ties], rng)
+    seen = nearest(positions)
+    ranks = equalize(scale(positions[seen]))
+    walls = load.walls[seen]
+    found = [
+        spearmanr(*ranks[walls == wall][:, [0, 2]].T).statistic
+        for wall in np.unique(walls)
+        if (walls == wall).sum() > 3
+    ]
+    along_x = np.full(len(load), np.nan)
+    along_x[seen] = ranks[:, 0]
+    below, above = (along_x[each] for each in load.contacts.pairs(ABOVE))
+    return {
+        "load": load_seed, "ties": ties, "spearman": float(np.mean(found)),
+        "pairs": int(np.isfinite(below + above).sum()), "upper": int((above < below).sum()),
+    }  # fmt: skip

@@ -42,7 +42,7 @@ def test_paper_makes_every_part(called):
     calls = called("paper", "--jobs", "3")
     assert [name for name, _ in calls] == list(command.PARTS)
     for name, given in calls:
-        assert given == ({} if name in ("observation", "earlier") else {"n_jobs": 3})
+        assert given == ({} if name in ("observation", "engines") else {"n_jobs": 3})
 
 
 def test_what_nothing_can_run_with_is_refused_in_one_line(called, capsys):
@@ -55,6 +55,8 @@ def test_what_nothing_can_run_with_is_refused_in_one_line(called, capsys):
 def test_every_provenance_names_a_command_of_today():
     for path in paths.DATA.rglob("provenance.json"):
         for name, record in files.read_json(path).items():
+            if "program" in record:  # which has left, and stands at the revision named there
+                continue
             today = record.get("present_command", record["command"]).split()
             assert today[:2] == ["python", "-m"], (path, name)
             if today[2] == "studies":

@@ -3,7 +3,6 @@
 import subprocess
 from dataclasses import replace
 from functools import partial
-from importlib.util import module_from_spec, spec_from_file_location
 from unittest.mock import Mock
 
 import numpy as np
@@ -13,16 +12,14 @@ from joblib import Parallel, delayed
 
 from studies import paths, results
 from studies.falls.long import LONG
-from studies.grid import published_runs, read_grid, recorded_config
+from studies.grid import published_runs, read_grid
 from studies.paper.training import PAPER
 from studies.paper.tuning import TUNING
 from studies.policies.variants import GRIDS
 from studies.results import kept, measured, publish, read_provenance, read_table, revision
 from studies.seamless.training import SEAMLESS
 from studies.ties.training import TIES
-from unload import TrainConfig
 from unload.physics.bullet import engine_of
-from unload.support import files
 
 PUBLISHED = {grid.name: grid for grid in (PAPER, TUNING, LONG, SEAMLESS, *GRIDS.values())}
 RECORDED = PUBLISHED | {TIES.name: TIES}  # not all of its runs were made
@@ -73,41 +70,6 @@ def test_no_flipped_bit_of_an_answer_changes_it(tmp_path, asked, capfd):
     assert asked.call_count > 50 and "It is computed again" in capfd.readouterr().err
     path.write_bytes(whole[:-9])
     assert str(kept(tmp_path, {"seed": 1}, partial(asked, value)).value) == str(right)
-
-
-class Trap:
-    """Makes a file when it is unpickled."""
-
-    def __init__(self, path):
-        self.path = path
-
-    def __reduce__(self):
-        return open, (self.path, "w")
-
-
-def test_a_forged_answer_runs_no_code(tmp_path, asked):
-    kept(tmp_path, {"seed": 1}, partial(asked, 1))
-    (path,) = tmp_path.glob("*.npz")
-    np.savez(path, json=np.array([Trap(str(tmp_path / "sprung"))], object))
-    assert kept(tmp_path, {"seed": 1}, partial(asked, 1)).value == 1
-    assert asked.call_count == 2 and not (tmp_path / "sprung").exists()
-
-
-def test_an_edit_of_what_keeps_answers_deletes_none(tmp_path, asked):
-    for seed in (1, 2):
-        kept(tmp_path / "runs", {"seed": seed}, partial(asked, seed))
-    text, edited = (
-        (paths.ROOT / "studies/results.py").read_text(encoding="utf-8"),
-        tmp_path / "results.py",
-    )
-    text = text.replace('    """The answer to', '    """Edited: the answer to')
-    edited.write_text(text, encoding="utf-8")
-    spec = spec_from_file_location("studies.results", edited)
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    for seed in (3, 1, 2):
-        assert module.kept(tmp_path / "runs", {"seed": seed}, partial(asked, seed)).value == seed
-    assert asked.call_count == 3
 
 
 def test_an_answer_of_other_physics_is_not_taken(own_data, set_in):
@@ -189,45 +151,18 @@ def test_the_projects_own_commit_is_its_revision(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", RECORDED)
 def test_the_settings_of_published_runs_are_their_configurations(name):
-    """Those that stand beside them train the runs again."""
+    """Those that stand beside them train the runs again.
+
+    A network of the studies stood there with a digest of its file as it was then.
+    """
     record = read_provenance(name)
-    recorded = {cell: recorded_config(fields) for cell, fields in record["settings"].items()}
+    recorded = dict(record["settings"])
     for cell, plan in RECORDED[name].cells.items():
-        assert recorded.pop(cell) == replace(plan.config, seed=plan.seeds[0])
+        fields = recorded.pop(cell)
+        fields["network"] = fields["network"].split()[0]
+        assert replace(plan.config, seed=plan.seeds[0]).plain().items() <= fields.items()
     # Of a grid from which cells were taken out, their settings are kept.
     assert bool(recorded) == (published_runs(record) < record["runs"])
-
-
-def test_every_recorded_configuration_is_built_again():
-    """Of whatever is published, wherever in its settings it stands."""
-    found = []
-
-    def build(settings: dict) -> None:
-        if "batch_size" in settings and "network" in settings:
-            config = recorded_config(settings)
-            found.append(config)
-            for name, value in config.plain().items():
-                assert name == "network" or settings[name] == value
-            assert config.plain()["network"] == settings["network"].split()[0]
-            return
-        for entry in settings.values():
-            if isinstance(entry, dict):
-                build(entry)
-
-    for path in paths.DATA.rglob("provenance.json"):
-        for record in files.read_json(path).values():
-            build(record["settings"])
-    assert len(found) > 100 and len({config.network for config in found}) == 3
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("epsilon_fraction", 0.4), ("shuffle_places", True), ("checkpoint_interval", 0.0)],
-)
-def test_a_recorded_configuration_that_no_run_can_have_any_more_is_refused(name, value):
-    settings = TrainConfig().plain() | {name: value}
-    with pytest.raises(ValueError, match=f"{name} is {value}; expected .* no such field any more"):
-        recorded_config(settings)
 
 
 @pytest.mark.parametrize("name", PUBLISHED)

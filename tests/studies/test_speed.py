@@ -89,20 +89,6 @@ def test_each_update_that_is_timed_is_what_it_is_called(set_in):
     assert torch.get_num_threads() == 1
 
 
-def test_the_first_steps_of_stable_baselines_do_not_count(set_in):
-    """They fill its memory: a second each here, and 0.64 s each of the ten that follow."""
-    config = unload.TrainConfig()
-    before = config.batch_size // config.num_envs + 2
-    clock = iter(np.cumsum([1.0] * before + [0.64] * 20))
-
-    def learn(picks, callback):
-        assert all(callback() for _ in range(picks // config.num_envs))
-
-    set_in(run, containers=lambda config: None, time=SimpleNamespace(perf_counter=clock.__next__))
-    set_in(run, dqn=lambda config, envs: SimpleNamespace(learn=learn))
-    assert run._their_rate(10 * config.num_envs, 1) == pytest.approx(100)
-
-
 def test_speeds_are_printed_and_published_with_ratios(own_data, set_in, capsys):
     set_in(run, lift_rates=lambda load: {"full": 2.0, "table": 12345.0})
     set_in(run, pick_rates=lambda: {"one": 4.0})

@@ -11,7 +11,7 @@ import torch
 from studies import paths
 from studies.falls import cells, laboratory, long, measures
 from studies.falls.laboratory import CONFIG
-from studies.grid import published_runs, read_policies, recorded_config
+from studies.grid import published_runs, read_policies
 from studies.paper.training import PAPER
 from studies.policies.margin import own_scores
 from studies.results import read_provenance, read_table
@@ -70,7 +70,7 @@ def test_the_published_runs_are_those_of_the_cells_and_of_the_configuration(name
     seeds = {cell: sorted(group["seed"]) for cell, group in read_table(name).groupby("cell")}
     assert seeds == {name: list(cell.seeds) for name, cell in planned.items()}
     record = read_provenance(name)
-    assert recorded_config(record["settings"]["config"]) == CONFIG
+    assert CONFIG.plain().items() <= record["settings"]["config"].items()
     assert published_runs(record) == sum(map(len, seeds.values()))
 
 
@@ -80,18 +80,6 @@ def test_the_published_traces_are_of_the_whole_runs_that_are_traced():
     assert set(trace["picks"]) == set(range(15_936, 384_000, laboratory.EVERY))
     assert long_trace["seed"].unique().tolist() == [*long.TRACED_SEEDS]
     assert set(long_trace["picks"]) == set(range(31_936, 20_000_000, 32_000))
-
-
-def test_cells_differ_from_the_first_in_what_they_are_named_for():
-    configs = {name: cell.config for name, cell in laboratory.CELLS.items()}
-    plain, paper = configs["ranks"], PAPER.cells["paper_mask"].config
-    assert configs["ranks_no_mask"] == replace(plain, mask=False) and plain.mask
-    assert configs["ranks_features"] == replace(plain, n_features=paper.n_features) != plain
-    slow = cells.FRESH["shuffled_no_mask_learning_rate"].config
-    assert slow == replace(plain, mask=False, learning_rate=paper.learning_rate) != plain
-    for axis, name in enumerate(("averaged_x", "averaged_y", "averaged_z")):
-        assert not configs[name].equalize and cells.SEEN[name].keywords == {"averaged": (axis,)}
-    assert 2 * plain.epsilon(cells.HELD_FROM) == plain.epsilon(0) + plain.epsilon(plain.picks)
 
 
 def test_the_rule_was_fitted_on_the_published_networks():
@@ -198,12 +186,3 @@ def test_judging_without_place_makes_height_decide(network):
     with_mask = measures.judged(network, config, loads=loads)
     assert measures.judged(network, replace(config, mask=False), loads=loads) < with_mask - 0.2 < 1
     assert measures.judged(network, config, seen=lambda o: o * [1, 0, 1], loads=loads) == 1
-
-
-def test_depth_misleads_only_where_ranks_are_random():
-    msr = {
-        (x, y, ties): evaluate(measures.preferring(x, y, ties), 2)["success_rate"].mean()
-        for x, y, ties in ((0, 0, "noise"), (1, 0, "noise"), (1, 0, "average"), (0, 1, "average"))
-    }
-    assert msr[0, 0, "noise"] == 1 == msr[1, 0, "average"]
-    assert msr[1, 0, "noise"] < 0.8 and msr[0, 1, "average"] < 0.8

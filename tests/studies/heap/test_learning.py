@@ -47,7 +47,7 @@ def test_the_oracle_believes_the_physics_of_the_environment(make_heap_env, cubes
     """
     heap = cubes((5.62, 2.0, 0), (4.8, 0.5, 0), (5.21, 0.5, 0), (5.62, 0.5, 0))
     env = make_heap_env(heap)
-    oracle = Oracle(env, falls_weight=1.0, physics="coarse")
+    oracle = Oracle(env, falls_weight=1.0)
     nothing = oracle._rakes[0].pick(cubes((4.5, 1, 0)), 0)
     monkeypatch.setattr(oracle._rakes[0], "pick", lambda heap, box: nothing)
     episode = play(env, oracle, heap, 0)

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 import torch
 
-from studies.policies import comparison, sb3, scaled, variants
+from studies.policies import comparison, sb3, variants
 from studies.policies.comparison import FRONT_WALLS, PLAYED, PLAYERS, comparison_data, digests
 from studies.policies.margin import containers, own_scores, pairs_in_sight, steps_of
 from studies.policies.variants import judged
@@ -42,13 +42,13 @@ def test_the_first_containers_of_a_condition_are_those_of_the_committed_data(
     monkeypatch.setattr(comparison, "LOADS", 2)
     rows = read_table("policies").query("policy == 'nearest' and condition == @condition")
     found = comparison.compare("nearest", True, condition)["success_rate"]
-    assert rows["success_rate"].head(2).tolist() == pytest.approx(found.tolist(), abs=1e-5)
+    assert rows["success_rate"].head(2).tolist() == pytest.approx(found, abs=1e-5)
 
 
-@pytest.mark.parametrize("scale", scaled.FITTING)
+@pytest.mark.parametrize("scale", comparison.FITTING)
 def test_a_load_of_another_scale_fills_what_it_can(rng, scale):
-    walls, rows, columns = scaled.FITTING[scale]
-    load = scaled.scaled_load(scale, rng)
+    walls, rows, columns = comparison.FITTING[scale]
+    load = comparison.scaled_load(scale, rng)
     reach = (load.positions + load.sizes / 2).max(axis=0)
     width = (CELLS_WIDE + 10 * (columns - 4)) * CELL * scale
     height = rows * CELLS_HIGH * CELL * scale

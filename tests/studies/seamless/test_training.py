@@ -16,12 +16,11 @@ from studies.grid import read_grid
 from studies.results import read_table
 from studies.seamless import training
 from studies.seamless.jamming import jam, neighbours
-from studies.seamless.jams import place
 from studies.seamless.training import CELLS, EXPORTED, FIRST_SEED
 from studies.statistics import seamless_plan
 from unload import task
 from unload.agent.training import Training
-from unload.load.boxes import Load
+from unload.load.boxes import BESIDE, Load
 
 NAMES = [f"{name}.csv" for name in ("loss_function_agent", "total_rew_function_agent")]
 
@@ -39,13 +38,12 @@ def test_the_jams_of_the_next_episode_are_others():
     assert (found[0] != found[1])[free].mean() == pytest.approx(2 / 3, abs=0.1)
 
 
-def test_neighbours_are_those_of_the_measured_places():
+def test_neighbours_are_those_that_touch_a_box():
     run = Training(replace(CONFIG, seed=3, epsilon_final=1.0, mask=False))
     for _ in range(40):
         run.step()
     run.rollout.close()
-    envs = run.rollout.envs.unwrapped
-    state, seen = envs._containers, set()
+    state, seen = run.rollout.envs.unwrapped._containers, set()
     for row in range(0, 128, 9):
         items = state.visible[:, row].astype(np.int64)
         covered, beside = neighbours(state, items)
@@ -54,9 +52,11 @@ def test_neighbours_are_those_of_the_measured_places():
             boxes = state.geometry[env, :count]
             walls = np.unique(boxes[:, 0] - boxes[:, 3] / 2, return_inverse=True)[1]
             load = Load(boxes[:, :3], boxes[:, 3:], np.zeros(count, int), walls)
-            found = place(load, state.present[env, :count].astype(bool), int(items[env]))
-            assert (covered[env], beside[env]) == (found["covered"], found["beside"])
-            seen.add((found["covered"], found["beside"]))
+            item, present = int(items[env]), state.present[env, :count].astype(bool)
+            touches = present & (load.walls == load.walls[item] + 1)
+            found = load.behind(touches)[item], present[load.contacts.of(BESIDE, item)].sum()
+            assert (covered[env], beside[env]) == found
+            seen.add(found)
     assert len(seen) >= 6
 
 

@@ -1,7 +1,6 @@
 """Whether a run is like the paper's figures, part by part; and what is published of ties."""
 
 import re
-import subprocess
 from fnmatch import fnmatch
 
 import numpy as np
@@ -11,9 +10,10 @@ import pytest
 from studies import paths
 from studies.grid import published_runs, read_grid
 from studies.results import read_provenance, read_table
-from studies.ties import earlier, leak, training
+from studies.ties import training
 from studies.ties.criterion import FIG11, FIG12, READINGS, likeness, noisier_readings, scatter
 from studies.ties.laboratory import CELLS
+from studies.ties.noise import told_by_rank
 from tests.studies.test_statistics import course
 
 # Of ten million picks in twenty windows: falls, rises, sinks slowly; the MSR becomes slower and
@@ -103,29 +103,17 @@ def test_published_runs_are_whole_ones_of_the_grid():
 
 
 def test_the_runs_of_the_first_plan_are_all_there():
-    table, curves = read_table("ties/earlier"), read_grid(earlier.EARLIER)
+    table, curves = read_table("ties/earlier"), read_grid(training.EARLIER)
     assert len(table) == 226 and table["cell"].nunique() == 38
-    twenty = table[table["cell"].isin(earlier.EARLIER.cells)].set_index(["cell", "seed"])["end"]
+    twenty = table[table["cell"].isin(training.EARLIER.cells)].set_index(["cell", "seed"])["end"]
     late = curves[curves["picks"] > 18_000_000].groupby(["cell", "seed"])["success_rate"].mean()
     assert len(late) == 20 and np.allclose(late.sort_index(), twenty.sort_index(), atol=1e-4)
 
 
 @pytest.mark.parametrize("ties", ["order", "noise"])
 def test_order_tells_which_box_is_the_upper_one(ties):
-    told = leak.told_by_rank(leak.LOADS[0], ties)
+    told = told_by_rank(700, ties)
     if ties == "order":
         assert told["upper"] == told["pairs"] and told["spearman"] < -0.8
     else:
         assert told["upper"] == pytest.approx(told["pairs"] / 2, rel=0.3)
-
-
-def test_a_clone_without_the_history_is_refused(own_data, tmp_path, monkeypatch):
-    """A shallow clone is another repository to Git, and so is one that is none."""
-    monkeypatch.setattr(paths, "ROOT", tmp_path)
-    message = f"no revision {earlier.REVISION}; expected a clone with its whole history"
-    with pytest.raises(RuntimeError, match=message):
-        earlier.earlier_data()
-    subprocess.run(["git", "init", "-q", str(tmp_path)], check=True)
-    with pytest.raises(RuntimeError, match=message):
-        earlier.earlier_data()
-    assert not [*own_data.rglob("earlier*")]
