@@ -6,19 +6,15 @@ Every box is simulated by PyBullet, and nothing is put back: what a pick moves s
 while a box is pulled the others go on to creep. Observed are boxes that nobody touches.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
-from matplotlib.ticker import ScalarFormatter
 from scipy.stats import spearmanr
 
 from studies.results import COMMAND, keep_all, publish
 from studies.seamless.jams import Case, SeamlessPhysics, load_of
-from studies.style import COLOURS, styled
 from unload import task
 from unload.env.observation import nearest
 from unload.physics.bullet import GAP
@@ -139,33 +135,6 @@ def durations(table: pd.DataFrame) -> pd.DataFrame:
     """Means of what ``rows`` say of the package's gap, by ``walls``, ``axis`` and ``lag``."""
     usual = table[table["gap"] == GAP]
     return usual.groupby(["walls", "axis", "lag"])[["boxes", "rms", "spearman"]].mean()
-
-
-@styled
-def draw_durations(table: pd.DataFrame, drift: Sequence[float]) -> Figure:
-    """How long the order among equals lasts, by axis, beside noise that drifts.
-
-    Args:
-        table: as ``creep_data`` writes it.
-        drift: of this noise, the correlation from one pick to the next along x, y and z.
-    """
-    figure, panels = plt.subplots(1, 3, figsize=(8.4, 3), sharey=True)
-    found, lags = durations(table)["spearman"], np.arange(1, LAGS[-1] + 1)
-    for axes, axis, correlation in zip(panels, "xyz", drift):
-        for walls, marker, label in ((3, "o-", "three walls"), (12, "s-", "a whole container")):
-            measured = found[walls, axis]
-            hollow = None if walls == 3 else "none"
-            axes.plot(measured.index, measured, marker, color="0.25", mfc=hollow, ms=4, label=label)
-        axes.plot(lags, correlation**lags, "--", color=COLOURS["ranks"], label="drifting noise")
-        axes.axhline(0, color="0.6", linewidth=0.8)
-        axes.set(title=f"along {axis}; drift: ρ = {correlation:g}", ylim=(-0.2, 1.05))
-        axes.set(xscale="log", xticks=LAGS[::2])
-        axes.xaxis.set_major_formatter(ScalarFormatter())
-        axes.minorticks_off()
-    panels[0].set_ylabel("rank correlation")
-    panels[1].set_xlabel("picks in between")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    return figure
 
 
 def creep_data(n_jobs: int = -1) -> None:

@@ -38,7 +38,7 @@ SIMULATED = {"fig02_containers"}  # the one figure for which boxes are moved
 PUBLISHED = {
     "00_playground": "cell-04 cell-07 cell-09",
     "01_task": "code-08 code-04 code-18",
-    "02_equalization": "code-16 code-18 creep",
+    "02_equalization": "fig04 code-16 code-18",
     "03_network": "code-04",
     "06_why_agents_go_wrong": "why-worth why-knowing 06-why-runs-fal-c8 why-phase why-runs-fall-14 "
     "why-ways why-mask why-helps",
