@@ -34,7 +34,6 @@ by_checks = importlib.import_module("notebooks.checks.masked_dqn")
 NINE = {
     checks.number: (lambda answer: answer == 9, [9, 9.0, np.int64(9), np.array([9.0]), "9"]),
     checks.pair: (lambda answer: answer == (9, 1), [(9, 1), [9, 1], np.array([9, 1])]),
-    checks.truth: (lambda answer: answer, [True, np.True_, "True"]),
     checks.text: (lambda answer: answer == "nine", ["nine", np.str_("nine")]),
     checks.function: (lambda answer: answer(8) == 9, [lambda value: value + 1]),
 }
@@ -222,3 +221,11 @@ def test_a_solution_is_shown_to_whoever_asks_and_stands_in_unseen(capsys):
     assert "def update(network, target" in display.call_args.args[0].data
     with pytest.raises(ValueError, match="no function for '04/4'; expected '04/1', '04/2'"):
         solution("04/4")
+
+
+def test_a_scorer_must_let_a_third_item_decide():
+    right = judged(checks.exercise("03/3"), lambda features, mean: np.abs(features - mean))
+    linear = judged(checks.exercise("03/3"), lambda features, mean: features + mean)
+    single = judged(checks.exercise("03/3"), lambda features, mean: mean)
+    assert right == "right" and "can it prefer the item that is farthest" in linear
+    assert "of 3 features it makes values of shape ()" in single

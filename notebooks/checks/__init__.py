@@ -130,13 +130,6 @@ def numbers(answer: Any) -> list[float]:
     return np.asarray(list(answer), dtype=float).reshape(-1).tolist()
 
 
-def truth(answer: object) -> bool:
-    """True or False"""
-    if str(answer) not in ("True", "False"):
-        raise ValueError
-    return str(answer) == "True"
-
-
 def text(answer: object) -> str:
     """a text in quotation marks"""
     if not isinstance(answer, str):

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 
 import unload
-from notebooks.checks import Exercise, call, function, masked_dqn, number, numbers, pair, truth
+from notebooks.checks import Exercise, call, function, masked_dqn, number, numbers, pair
 from studies.falls import measures
 from studies.falls.laboratory import taught_preference
 from studies.play.episode import Run
@@ -115,6 +115,23 @@ def is_the_network(scores):
     return True
 
 
+def third_item_decides(scorer):
+    """Whether the third of three items can change which of the others a scorer prefers."""
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        first, second, *thirds = rng.random(4)
+        prefers = set()
+        for third in thirds:
+            features = np.array([first, second, third])
+            scores = np.asarray(call(scorer, features, features.mean()))
+            if scores.shape != features.shape:
+                return f"of {len(features)} features it makes values of shape {scores.shape}"
+            prefers.add(bool(scores[0] > scores[1]))
+        if len(prefers) == 2:
+            return True
+    return False
+
+
 # Notebook 05
 
 
@@ -189,7 +206,12 @@ EXERCISES = {
     "02/2": Exercise(function, leaves_the_ranks, "which functions keep the order of numbers?"),
     "03/1": Exercise(function, is_the_network, ""),
     "03/2": Exercise(number, lambda score: abs(score - 0.9) < 1e-6, "which pooled numbers change?"),
-    "03/3": Exercise(truth, lambda can: can, "try it with random weights"),
+    "03/3": Exercise(
+        function,
+        third_item_decides,
+        "whatever the third item is, it prefers the same one of two; "
+        "can it prefer the item that is farthest from the mean?",
+    ),
     **masked_dqn.EXERCISES,
     "05/1": Exercise(
         number,
