@@ -155,5 +155,4 @@ EXERCISES = {
         lambda p: abs(p * (1 - 0.5) - (1 - p)) < 0.01,
         "beyond β the loss of the failures has the slope 1, whatever the value",
     ),
-    "04/5": Exercise(number, lambda most: most == 1, "what would have to change to end one?"),
 }
