@@ -34,7 +34,6 @@ by_checks = importlib.import_module("notebooks.checks.masked_dqn")
 NINE = {
     checks.number: (lambda answer: answer == 9, [9, 9.0, np.int64(9), np.array([9.0]), "9"]),
     checks.pair: (lambda answer: answer == (9, 1), [(9, 1), [9, 1], np.array([9, 1])]),
-    checks.truth: (lambda answer: answer, [True, np.True_, "True"]),
     checks.text: (lambda answer: answer == "nine", ["nine", np.str_("nine")]),
     checks.function: (lambda answer: answer(8) == 9, [lambda value: value + 1]),
 }
@@ -199,3 +198,59 @@ def test_a_solution_is_shown_to_whoever_asks_and_stands_in_unseen(capsys):
     assert "def update(network, target" in display.call_args.args[0].data
     with pytest.raises(ValueError, match="no function for '04/4'; expected '04/1', '04/2'"):
         solution("04/4")
+
+
+def test_a_scorer_must_let_a_third_item_decide():
+    right = judged(checks.exercise("03/3"), lambda features, mean: np.abs(features - mean))
+    linear = judged(checks.exercise("03/3"), lambda features, mean: features + mean)
+    single = judged(checks.exercise("03/3"), lambda features, mean: mean)
+    assert right == "right" and "can it prefer the item that is farthest" in linear
+    assert "of 3 features it makes values of shape ()" in single
+
+
+def test_plausible_mistakes_are_named_as_what_they_are():
+    def of_one_container(observations, masks, rng):
+        return np.where(masks.astype(bool), observations[..., 2], np.inf).argmin()
+
+    def scores_of_all_containers(observations, masks, rng):
+        return observations[..., 2]
+
+    for name, wrong, said in (
+        ("00/1", 302, "302 looks like the sum over 20 loads; expected their mean"),
+        ("00/1", 40, "the same seed, 0 to 19; play to 50"),
+        ("00/2", 0.15, "0.15 is not a number of loads; expected one of 0 to 20"),
+        ("01/2", of_one_container, "asked about 2 containers it returns int64 of shape ()"),
+        (
+            "01/2",
+            scores_of_all_containers,
+            "float32 of shape (2, 128); expected an array of 2 actions",
+        ),
+        ("02/2", lambda values: values, "it keeps the order of values, but changes none of them"),
+        ("02/2", np.sum, "of 128 values it makes an array of shape ()"),
+        ("02/2", np.negative, "which functions keep the order of numbers?"),
+        ("05/2", (0.493, 1.0), "both are right, in the wrong order; expected positions first"),
+        ("05/2", (0.9, 0.9), "the preference is along x, c = 0: rule(0, 1)"),
+        ("05/3", of_one_container, "expected an array of 2 actions, one a container"),
+    ):
+        assert said in judged(checks.exercise(name), wrong), name
+
+
+def test_random_numbers_that_nobody_needs_are_noticed():
+    """Scores drawn for all environments, of which those that explore use theirs."""
+
+    def draws_for_all(network, observations, allowed, epsilon, rng):
+        explore = rng.random(len(allowed)) < epsilon
+        with torch.no_grad():
+            scores = network(torch.from_numpy(observations)).numpy()
+        scores[explore] = rng.random(scores.shape)[explore]
+        return np.where(allowed, scores, -np.inf).argmax(axis=1)
+
+    said = judged(checks.exercise("04/1"), draws_for_all)
+    assert (
+        "with ε = 0.0 actions are right, the count of random numbers drawn is not; expected" in said
+    )
+
+    def others(*given):
+        return (plain.choose(*given) * 0) + 7
+
+    assert "of 64 actions differ from the package's" in judged(checks.exercise("04/1"), others)

@@ -88,7 +88,10 @@ def test_committed_outputs_are_clean(path):
     assert not [output for output in outputs if output["output_type"] == "error"]
     assert not [output for output in outputs if output.get("name") == "stderr"]
     assert not [output for output in outputs if run.WIDGET_MIMETYPE in output.get("data", {})]
-    assert "widgets" not in json.loads(path.read_text(encoding="utf-8"))["metadata"]
+    metadata = json.loads(path.read_text(encoding="utf-8"))["metadata"]
+    assert "widgets" not in metadata
+    kernel = metadata["kernelspec"]["display_name"]
+    assert kernel == "Python 3 (ipykernel)", "JupyterLab would write its own name on opening"
     assert path.stat().st_size < 1_500_000
 
 

@@ -105,15 +105,6 @@ def test_the_numbers_are_those_of_the_data():
     assert f"| Random picks | | | {msr['random']:.0f} % |" in README and msr["highest"] == 100
 
 
-def test_the_moving_picture_is_described_by_its_notebook():
-    """Containers that are emptied, of 100, as notebook 01 prints them."""
-    notebook = (ROOT / "notebooks/01_task.ipynb").read_text(encoding="utf-8")
-    rows = re.findall(r"\d +(\w+) +(True|False) +(\d+) +[\d.]+", notebook)
-    emptied = {(policy, mask == "True"): int(count) for policy, mask, count in rows}
-    assert emptied["paper_seed_2", False] == 0 and emptied["recommended", False] == 100
-    assert all(count == 100 for (_, mask), count in emptied.items() if mask)
-
-
 def mean_and_half(rates: pd.Series) -> str:
     """In %, with half of the 95 % interval."""
     low, high = t_interval(100 * rates)

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 
 import unload
-from notebooks.checks import Exercise, call, function, masked_dqn, number, numbers, pair, truth
+from notebooks.checks import Exercise, Unusable, call, function, masked_dqn, number, numbers, pair
 from studies.falls import measures
 from studies.falls.laboratory import taught_preference
 from studies.play.episode import Run
@@ -16,10 +16,13 @@ from unload.physics.table import TablePhysics, shared_table
 # Notebook 00
 
 
+LOADS = 20
+
+
 def runs(player, picks, **options):
-    """A player's runs on 20 loads."""
+    """A player's runs on some loads."""
     played = []
-    for seed in range(20):
+    for seed in range(LOADS):
         run = Run(player, unload.stack_load(np.random.default_rng(seed)), seed, **options)
         run.play_to(picks)
         played.append(run)
@@ -27,12 +30,32 @@ def runs(player, picks, **options):
 
 
 def successes(mean):
-    return abs(mean - np.mean([run.unloaded() for run in runs("random", 50)])) < 1.5
+    expected = np.mean([run.unloaded() for run in runs("random", 50)])
+    if abs(mean / LOADS - expected) < 1.5:
+        return f"{mean:g} looks like the sum over {LOADS} loads; expected their mean"
+    return abs(mean - expected) < 1.5
 
 
 def deadlocks(loads):
+    if not loads.is_integer():
+        return f"{loads:g} is not a number of loads; expected one of 0 to {LOADS}"
     played = runs("the paper's agent, seed 3", 100, mask=False)
     return loads == sum(any(pick.deadlocked for pick in run.picks) for run in played)
+
+
+def actions_of(policy, observations, masks, rng):
+    """The actions of a reader's policy.
+
+    Raises:
+        Unusable: they are not one for each container.
+    """
+    actions = np.asarray(call(policy, observations, masks, rng))
+    if actions.shape != masks.shape[:1] or actions.dtype.kind not in "iu":
+        raise Unusable(
+            f"asked about {len(masks)} containers it returns {actions.dtype} of shape "
+            f"{actions.shape}; expected an array of {len(masks)} actions, one a container"
+        )
+    return actions
 
 
 # Notebook 01
@@ -58,7 +81,7 @@ def seldom_succeeds(policy):
     obeys = []
 
     def noted(observations, masks, rng):
-        actions = np.asarray(call(policy, observations, masks, rng))
+        actions = actions_of(policy, observations, masks, rng)
         obeys.extend(masks[np.arange(len(actions)), actions] == 1)
         return actions
 
@@ -91,8 +114,11 @@ def equalizes(equalized):
 def leaves_the_ranks(change):
     values = np.random.default_rng(0).uniform(-1, 1, 128)
     changed = np.asarray(call(change, values.copy()))
-    same = np.array_equal(unload.equalize(changed[:, None]), unload.equalize(values[:, None]))
-    return same and not np.allclose(changed, values)
+    if changed.shape != values.shape:
+        return f"of {len(values)} values it makes an array of shape {changed.shape}"
+    if np.allclose(changed, values):
+        return "it keeps the order of values, but changes none of them"
+    return np.array_equal(unload.equalize(changed[:, None]), unload.equalize(values[:, None]))
 
 
 # Notebook 03
@@ -115,6 +141,23 @@ def is_the_network(scores):
     return True
 
 
+def third_item_decides(scorer):
+    """Whether the third of three items can change which of the others a scorer prefers."""
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        first, second, *thirds = rng.random(4)
+        prefers = set()
+        for third in thirds:
+            features = np.array([first, second, third])
+            scores = np.asarray(call(scorer, features, features.mean()))
+            if scores.shape != features.shape:
+                return f"of {len(features)} features it makes values of shape {scores.shape}"
+            prefers.add(bool(scores[0] > scores[1]))
+        if len(prefers) == 2:
+            return True
+    return False
+
+
 # Notebook 05
 
 
@@ -129,6 +172,8 @@ def both(shares):
         unload.evaluate(along_depth, 4, 0, equalize=ranks)["success_rate"].mean()
         for ranks in (False, True)
     ]
+    if np.allclose(shares, found[::-1], atol=0.02):
+        return "both are right, in the wrong order; expected positions first"
     return np.allclose(shares, found, atol=0.02)
 
 
@@ -137,7 +182,7 @@ def digs_left(rule):
     places = []
 
     def noted(observations, masks, rng):
-        actions = np.asarray(call(rule, observations, masks, rng))
+        actions = actions_of(rule, observations, masks, rng)
         places.extend(observations[np.arange(len(actions)), actions, 1].tolist())
         return actions
 
@@ -179,8 +224,8 @@ FIRST_TEACHER, PUPILS = 0.1, 4
 
 
 EXERCISES = {
-    "00/1": Exercise(number, successes, "load and run have the same seed, 0 to 19"),
-    "00/2": Exercise(number, deadlocks, "did you give mask=False, and the seed of the load?"),
+    "00/1": Exercise(number, successes, "load and run have the same seed, 0 to 19; play to 50"),
+    "00/2": Exercise(number, deadlocks, "does each run have mask=False and its load's seed?"),
     "01/1": Exercise(number, best_weight, "move the slider"),
     "01/2": Exercise(
         function, seldom_succeeds, "observations[..., 2] is the height; obey the masks"
@@ -189,14 +234,19 @@ EXERCISES = {
     "02/2": Exercise(function, leaves_the_ranks, "which functions keep the order of numbers?"),
     "03/1": Exercise(function, is_the_network, ""),
     "03/2": Exercise(number, lambda score: abs(score - 0.9) < 1e-6, "which pooled numbers change?"),
-    "03/3": Exercise(truth, lambda can: can, "try it with random weights"),
+    "03/3": Exercise(
+        function,
+        third_item_decides,
+        "whatever the third item is, it prefers the same one of two; "
+        "can it prefer the item that is farthest from the mean?",
+    ),
     **masked_dqn.EXERCISES,
     "05/1": Exercise(
         number,
         lambda height: abs(height - 0.3 * 1.25 / 2) < 0.005,
         "a step goes half a width to the side and one height up",
     ),
-    "05/2": Exercise(pair, both, "evaluate over 4 containers from seed 0 on"),
+    "05/2": Exercise(pair, both, "the preference is along x, c = 0: rule(0, 1)"),
     "05/3": Exercise(function, digs_left, ""),
     "06/1": Exercise(number, errs_first, "try both signs; the title of the figure gives the MSR"),
     "06/2": Exercise(numbers, teach_each_other, ""),

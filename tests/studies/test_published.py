@@ -37,8 +37,8 @@ SIMULATED = {"fig02_containers"}  # the one figure for which boxes are moved
 # the notebook alone; of a report all.
 PUBLISHED = {
     "00_playground": "cell-04 cell-07 cell-09",
-    "01_task": "code-08 code-04 code-18",
-    "02_equalization": "code-16 code-18 creep",
+    "01_task": "code-08 code-04",
+    "02_equalization": "fig04 code-16 code-18",
     "03_network": "code-04",
     "06_why_agents_go_wrong": "why-worth why-knowing 06-why-runs-fal-c8 why-phase why-runs-fall-14 "
     "why-ways why-mask why-helps",
@@ -182,7 +182,7 @@ def test_figures_are_saved_as_the_same_bytes(tmp_path, monkeypatch):
 
 
 def test_the_moving_picture_is_the_one_that_its_notebook_makes(tmp_path, monkeypatch):
-    """Drawn are the frames that its palette is taken from, and two others."""
+    """Drawn are the frames that its palette is taken from, and two others; and what it shows."""
     committed = paths.ROOT / "figures" / "unloading.gif"
     assert committed.stat().st_size <= 2_000_000, "too large for a README"
     with Image.open(committed) as published:
@@ -209,6 +209,12 @@ def test_the_moving_picture_is_the_one_that_its_notebook_makes(tmp_path, monkeyp
             assert found.info == published.info
             both = [np.asarray(frame.convert("RGB"), int) for frame in (found, published)]
             assert (np.abs(both[0] - both[1]) > 25).mean() < 1e-5
+    # As the README and the notebook say: one box for ever; errs and empties; never errs.
+    stuck, masked, positions = namespace["episodes"].values()
+    last = stuck.picks[-animation.STUCK :]
+    assert len({pick.item for pick in last}) == 1 and not any(pick.success for pick in last)
+    assert masked.unloaded() == len(masked.load) < len(masked.picks)
+    assert positions.unloaded() == len(positions.load) == len(positions.picks)
 
 
 def prose(notebook: str) -> str:
