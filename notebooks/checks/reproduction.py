@@ -63,12 +63,12 @@ EXERCISES = {
     "12/1": Exercise(
         text,
         lambda change: "".join(change.split()).strip("\"'") == "equalize=False",
-        "compare unload.evaluate(policy, mask=False) of the two",
+        "apply both in new containers, with the mask and without; compare each with the live run",
     ),
-    "12/2": Exercise(number, lambda largest: largest == 0, "were both runs of the same PICKS?"),
-    "13/1": Exercise(
+    "12/2": Exercise(
         number,
-        enough,
-        "the first point below 5 % in the figure of section 2; more EXPERIMENTS make it surer",
+        lambda largest: largest == 0,
+        "both runs need the same configuration, and the second call the folder of the first",
     ),
+    "13/1": Exercise(number, enough, "the first point below 5 % in the figure of section 2"),
 }
