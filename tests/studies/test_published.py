@@ -47,7 +47,7 @@ PUBLISHED = {
     "12_training": "training-method cell-13 cell-19 cell-23 training-ends training-answer",
     "13_how_sure_are_you": "cell-04 sure-intervals",
     "20_a_policy_without_a_miss": "698c4502",
-    "21_when_is_learning_worth_it": "cell-06 cell-09 cell-17 cell-23 cell-25 cell-27 cell-28 "
+    "21_when_is_learning_worth_it": "cell-06 cell-09 cell-17 cell-23 cell-25 cell-27 "
     "greed-by-pick greed-ratios greed-switch",
     "22_how_it_became_fast": "52be85f7 fast-lifts 592fcdbf c563d4e7",
     "report/01_paper_and_here": "",
