@@ -57,6 +57,7 @@ def gained(points):
     )
     return abs(points - 100 * (on - off)) < 1
 
+
 EXERCISES = {
     "10/1": Exercise(pair, tells_one_from_two, ""),
     "10/2": Exercise(
