@@ -25,7 +25,7 @@ from studies.play import animation
 from studies.policies.comparison import comparison_msr
 from studies.results import read_table
 from studies.seamless.training import SEAMLESS
-from studies.statistics import PAPER_MSR, by_cell, by_run
+from studies.statistics import PAPER_MSR, by_cell, by_run, windows
 from studies.ties.criterion import READINGS, likeness, noisier_readings
 from studies.ties.training import TIES
 from tests.test_notebooks import cells as cells_in
@@ -296,6 +296,12 @@ def test_most_runs_that_rise_steadily_look_like_the_papers(runs):
     rising = started[started["steady"]]
     alike = rising[rising[["slower", "ends", "fig11"]].all(axis=1)]
     assert (len(started), len(rising), len(alike)) == (59, 19, 17)
+    curves = {grid.name: read_grid(grid) for grid in (SEAMLESS, TIES)}
+    for run in alike.itertuples():
+        curve = curves[run.grid].query("cell == @run.cell and seed == @run.seed")
+        late = curve["picks"] > 0.9 * curve["picks"].iloc[-1]
+        assert 0 < windows(curve)["loss"].max() - curve.loc[late, "loss"].mean() < 0.01
+    assert "after its peak their loss sinks by less than 0.01" in prose("12_training")
     counts = [alike[name].sum() for name in READINGS]
     assert counts == [1, 6, 7] and alike["both"].sum() == alike["windows"].sum()
     frozen = started[started["cell"].isin(["mask_noise", "no_mask_noise"])]
