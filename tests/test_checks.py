@@ -254,3 +254,23 @@ def test_random_numbers_that_nobody_needs_are_noticed():
         return (plain.choose(*given) * 0) + 7
 
     assert "of 64 actions differ from the package's" in judged(checks.exercise("04/1"), others)
+
+
+def test_answers_as_figures_and_tables_print_them_are_taken_and_hints_lead_on():
+    for name, right, wrong in (
+        ("12/2", [0, 0.0], [1e-3]),
+        ("13/2", [18, 18.4], [0.184, 20]),
+        ("20/1", [0.0016, 0.002], [0.196, 1]),
+        ("21/1", [0.2145, 0.21, 0.22, 0.23], [0.25, 1.86]),  # with and without the column of nets
+    ):
+        said = [judged(checks.exercise(name), answer) for answer in right + wrong]
+        assert [each == "right" for each in said] == [True] * len(right) + [False] * len(wrong)
+    for name, wrong, hint in (
+        ("12/1", "mask=True", "in new containers, with the mask and without"),
+        ("12/2", 0.1, "the same configuration, and the second call the folder of the first"),
+        ("13/1", 12, "the first point below 5 % in the figure of section 2"),
+        ("13/2", 0.184, "in points"),
+        ("20/1", 0.196, "evaluate with mask=False"),
+        ("21/1", 1.86, "section 3 has the training heaps, section 5 the unseen ones"),
+    ):
+        assert hint in judged(checks.exercise(name), wrong)

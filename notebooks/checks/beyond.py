@@ -28,10 +28,11 @@ def beats_highest(policy):
 
 
 def luckiest(value):
+    """Whether it is the difference, as exactly as the printed tables give it."""
     rules, table = read_table("heap/rules"), read_table("heap/table")
     on_training = rules.set_index("rule").loc[best_rule(rules, 1.0)]
     unseen = table.query("policy == 'best rule' and falls_weight == 1")["net"].item()
-    return abs(value - (on_training["boxes"] - on_training["falls"] - unseen)) < 0.01
+    return abs(value - (on_training["boxes"] - on_training["falls"] - unseen)) < 0.02
 
 
 def brings_more(rule):
@@ -58,14 +59,20 @@ def wider(value):
 
 
 EXERCISES = {
-    "20/1": Exercise(number, lambda msr: 0 <= msr < 0.05, "extractor.weight[:, 2] reads z"),
+    "20/1": Exercise(
+        number,
+        lambda msr: 0 <= msr < 0.05,
+        "extractor.weight[:, 2] reads z; evaluate with mask=False",
+    ),
     "20/2": Exercise(
         number,
         lambda height: abs(height - 0.17 * 1.25 / 2) < 0.02,
         "a step goes half a width to the side and one height up",
     ),
     "20/3": Exercise(function, beats_highest, ""),
-    "21/1": Exercise(number, luckiest, "rules.csv holds the training heaps, table.csv the others"),
+    "21/1": Exercise(
+        number, luckiest, "section 3 has the training heaps, section 5 the unseen ones"
+    ),
     "21/2": Exercise(function, brings_more, ""),
     "21/3": Exercise(number, wider, "variances of independent numbers add up"),
     "22/1": Exercise(pair, lambda kept: kept == (16 * 16, 128 * 16), "see section 4"),

@@ -152,7 +152,7 @@ def net_by_pick(frame: pd.DataFrame) -> Figure:
         frame: see ``greed_data``.
     """
     figure, axes = plt.subplots(figsize=(6.4, 3.6))
-    for rule_picks, name in ((MAX_PICKS, REFERENCE), (0, LEARNED)):
+    for rule_picks, name, label in ((MAX_PICKS, REFERENCE, REFERENCE), (0, LEARNED, "agent")):
         colour, picks = LINES[name], range(1, MAX_PICKS + 1)
         means = [nets(frame, (pick, pick))[rule_picks].mean() for pick in picks]
         axes.plot(picks, means, "o", color=colour, ms=3.5, alpha=0.6)
@@ -160,8 +160,8 @@ def net_by_pick(frame: pd.DataFrame) -> Figure:
             ends = first - 0.4, last + 0.4
             net = nets(frame, (first, last))[rule_picks] / (last - first + 1)
             mean, low, high = mean_interval(net)
-            label = name if first == 1 else None
-            axes.plot(ends, (mean, mean), color=colour, lw=2, label=label)
+            shown = label if first == 1 else None
+            axes.plot(ends, (mean, mean), color=colour, lw=2, label=shown)
             axes.fill_between(ends, low, high, color=colour, alpha=0.15, lw=0)
     axes.set(xlabel="pick", ylabel="boxes − falls", xticks=(1, 5, 10, 15), ylim=(0, None))
     axes.legend()
