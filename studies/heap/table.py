@@ -11,11 +11,8 @@ from collections.abc import Callable, Hashable, Mapping
 from itertools import islice, product
 from pathlib import Path
 
-import matplotlib.pyplot as plt
-import numpy as np
 import pandas as pd
 import torch
-from matplotlib.figure import Figure
 
 from studies import paths
 from studies.heap.env import MAX_PICKS, HeapEnv
@@ -25,7 +22,7 @@ from studies.heap.policies import RULES, Oracle, best, linear, play
 from studies.heap.recording import HEAPS, NAME, WEIGHTS, make_heaps, make_networks
 from studies.results import COMMAND, Result, code_of, keep_all, publish, read_table
 from studies.statistics import mean_interval, ratio_interval
-from studies.style import COLOURS, styled
+from studies.style import COLOURS
 from unload.support import files
 
 # A box near the front takes many along if others lie before it and on it; how much each of these
@@ -48,11 +45,6 @@ MEASURES = "boxes", "falls", "net"
 ENDS = "", "_low", "_high"  # of a mean and its interval
 LINES = {REFERENCE: COLOURS["highest"], LEARNED: "C0", ORACLE: "0.2"}
 # Where the names of rules stand that lie close together: offset in points, and alignment.
-NAME_PLACES = {
-    "clear above": ((8, 13), "right"), "nearest": ((0, -13), "center"),
-    "highest": ((5, -12), "left"), "random": ((5, -12), "left"),
-    "λ = 0.25": ((4, 8), "left"), "λ = 0.5": ((6, -11), "left"),
-}  # fmt: skip
 UNITS = {"boxes": "boxes a pick", "falls": "falls a pick", "net": "boxes − λ falls a pick"}
 
 
@@ -229,38 +221,6 @@ def compared(episodes: pd.DataFrame) -> pd.DataFrame:
                 row |= {f"{measure}{end}": value for end, value in zip(ENDS, ends)}
             rows.append(row)
     return pd.DataFrame(rows)
-
-
-@styled
-def throughput_falls() -> Figure:
-    """Boxes and falls a pick on unseen heaps: a point for each rule, a curve over λ for others."""
-    figure, axes = plt.subplots(figsize=(6.4, 4.2))
-    for name, rows in read_table(f"{NAME}/table").groupby("policy", sort=False):
-        rows = rows.sort_values("falls_weight")
-        colour = LINES.get(name, "0.6")
-        x, y = (
-            np.abs(rows[[f"{part}_low", f"{part}_high"]].to_numpy().T - rows[part].to_numpy())
-            for part in ("falls", "boxes")
-        )
-        axes.errorbar(rows["falls"], rows["boxes"], y, x, "o", color=colour, ms=4, lw=0.8)
-        label = name if name in LINES else None
-        axes.plot(rows["falls"], rows["boxes"], "o-", color=colour, ms=4, lw=1.6, label=label)
-        marks = {}
-        if name in RULES:
-            marks = {name: rows.iloc[0]}
-        elif name == LEARNED:
-            marks = {f"λ = {row['falls_weight']:g}": row for _, row in rows.iterrows()}
-        for text, row in marks.items():
-            usual = ((5, 4), "left") if name in RULES else ((-4, 5), "right")
-            place, side = NAME_PLACES.get(text, usual)
-            axes.annotate(
-                text, (row["falls"], row["boxes"]), xytext=place, textcoords="offset points",
-                ha=side, fontsize=8, color="0.4" if name in RULES else colour,
-            )  # fmt: skip
-    axes.set(xlabel=UNITS["falls"], ylabel=UNITS["boxes"])
-    axes.set_xlim(left=0)
-    axes.legend(loc="lower right", fontsize=8)
-    return figure
 
 
 def heap_data(n_jobs: int) -> None:

@@ -34,14 +34,16 @@ def three_digits(value: float) -> str:
 
 
 def best_times(calls: Mapping[str, Callable[[], object]]) -> dict[str, float]:
-    """The least wall time of each call, in s; the first of a round does not count.
+    """The least wall time of each call, in s; the first round does not count.
 
-    The least time is that of the call which was disturbed least.
+    All are made in turn, so that whatever else the machine does meets all of them alike. The least
+    time is that of the round which was disturbed least.
     """
-    return {
-        name: min(timeit.repeat(call, number=1, repeat=1 + ROUNDS)[1:])
-        for name, call in calls.items()
-    }
+    rounds = [
+        {name: timeit.timeit(call, number=1) for name, call in calls.items()}
+        for _ in range(1 + ROUNDS)
+    ]
+    return {name: min(times[name] for times in rounds[1:]) for name in calls}
 
 
 def lift_rates(load: unload.Load) -> dict[str, float]:

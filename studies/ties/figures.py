@@ -3,23 +3,22 @@
 How long an order of equals lasts; where runs end, by how ties are broken; single runs.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import EngFormatter, ScalarFormatter
 
 from studies.falls.long import LONG
 from studies.grid import Grid, read_grid
 from studies.paper.training import PAPER, SMOOTH
 from studies.results import read_table
-from studies.statistics import PAPER_MSR, PAPER_START, WINDOW_PICKS, by_run, windows
+from studies.statistics import PAPER_MSR, PAPER_START, by_run
 from studies.style import COLOURS, WITHOUT_MASK, styled
 from studies.ties.choice import COUNTS, WAYS
-from studies.ties.criterion import WORDS, likeness, open_course
+from studies.ties.criterion import likeness, open_course
 from studies.ties.laboratory import RHOS
 from studies.ties.training import EARLIER, SWEPT, TIES
 from unload.physics.bullet import GAP
@@ -71,35 +70,6 @@ def durations(table: pd.DataFrame) -> pd.DataFrame:
     """
     usual = table[table["gap"] == GAP]
     return usual.groupby(["walls", "axis", "lag"])[["boxes", "rms", "spearman"]].mean()
-
-
-@styled
-def draw_durations(table: pd.DataFrame, drift: Sequence[float]) -> Figure:
-    """How long the order among equals lasts, by axis, beside noise that drifts.
-
-    Args:
-        table: see ``durations``.
-        drift: of this noise, the correlation from one pick to the next along x, y and z.
-    """
-    figure, panels = plt.subplots(1, 3, figsize=(8.4, 3), sharey=True)
-    found, lags = durations(table)["spearman"], np.unique(table["lag"])
-    every = np.arange(1, lags[-1] + 1)
-    for axes, axis, correlation in zip(panels, "xyz", drift):
-        for walls, marker, label in ((3, "o-", "three walls"), (12, "s-", "a whole container")):
-            measured = found[walls, axis]
-            hollow = None if walls == 3 else "none"
-            axes.plot(measured.index, measured, marker, color="0.25", mfc=hollow, ms=4, label=label)
-        drifting = correlation**every
-        axes.plot(every, drifting, "--", color=COLOURS["ranks"], label="drifting noise")
-        axes.axhline(0, color="0.6", linewidth=0.8)
-        axes.set(title=f"along {axis}; drift: ρ = {correlation:g}", ylim=(-0.2, 1.05))
-        axes.set(xscale="log", xticks=lags[::2])
-        axes.xaxis.set_major_formatter(ScalarFormatter())
-        axes.minorticks_off()
-    panels[0].set_ylabel("rank correlation")
-    panels[1].set_xlabel("picks in between")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    return figure
 
 
 def read_by_ties() -> pd.DataFrame:
@@ -163,34 +133,6 @@ def draw_words(axes: Axes, scale: Callable = lambda msr: msr) -> None:
     axes.fill_between(PICKS * share, low, high, color="#f5eed6", zorder=0)
     ends = scale(np.array([PAPER_START, PAPER_MSR]))
     axes.plot([0, PICKS], ends, "k*", markersize=11, clip_on=False, zorder=4)
-
-
-@styled
-def draw_run(curve: pd.DataFrame) -> Figure:
-    """A run beside what the paper says of its own, and which parts of the criterion it meets.
-
-    Args:
-        curve: of one run, with ``cell`` and ``seed``.
-    """
-    means, holds = windows(curve), likeness(curve)
-    middle = (means.index + 0.5) * WINDOW_PICKS
-    figure, axes = plt.subplots(figsize=(6.4, 3.6))
-    draw_words(axes)
-    colour = COLOURS["ranks"]
-    axes.plot(curve["picks"], curve["success_rate"], color=colour, linewidth=0.6, alpha=0.5)
-    axes.plot(middle, means["success_rate"], "o-", color=colour, markersize=3)
-    axes.axvline(middle[means["loss"].argmax()], color="0.4", linestyle=":")
-    first = curve.iloc[0]
-    said = [
-        f"{mark} {', '.join(part for part in WORDS if holds[part] == wanted) or 'none'}"
-        for mark, wanted in (("met:", True), ("missed:", False))
-    ]
-    title = f"{first['cell']}, seed {first['seed']}\n{'; '.join(said)}"
-    axes.set(xlim=(0, PICKS), xticks=np.arange(5) * 5e6, xlabel="picks")
-    axes.set(ylim=(0, 1.02), ylabel="MSR while training")
-    axes.set_title(title, loc="left", fontsize=9)
-    axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
-    return figure
 
 
 def read_by_duration() -> pd.DataFrame:
