@@ -9,12 +9,16 @@ too, and so is the paper's beside them.
 
 from dataclasses import replace
 from functools import partial
+from itertools import product
+
+import pandas as pd
+from scipy import stats
 
 from studies.changes import height_reward
 from studies.falls import measures
 from studies.grid import Cell, Grid, train_grid
 from studies.networks import NETWORKS as KINDS
-from studies.results import COMMAND
+from studies.results import COMMAND, read_table
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.support import files
@@ -25,6 +29,7 @@ SMALL = TrainConfig(picks=320_000, batch_size=64, n_features=32, log_interval=50
 LOADS = {"episodes": 200, "seed": 1000}  # fresh containers for each trained policy
 SHARES = (0.25, 0.5, 0.9)  # of the height in the reward
 RECOMMENDED = TrainConfig(picks=1_000_000, equalize=False, log_interval=500)
+APPLIED = {"msr_mask": "with the mask", "msr_no_mask": "without the mask"}
 
 
 def judged(policy: Greedy, config: TrainConfig) -> dict[str, float]:
@@ -60,3 +65,22 @@ def variants_data(n_jobs: int = -1) -> None:
     kept = train_grid(GRIDS["recommended"], n_jobs=n_jobs)
     best = load_policy(kept / "positions/seed_0/policy.safetensors")
     save_policy(best, files.SHIPPED / "policies/recommended.safetensors")
+
+
+def differences(cells: dict[str, Cell]) -> pd.DataFrame:
+    """Differences of the cells' mean MSR from that of the first one, with their 95 % intervals.
+
+    Args:
+        cells: ``NETWORKS`` or ``REWARDS``.
+
+    Returns:
+        A row per cell and entry of ``APPLIED``: ``difference``, ``low`` and ``high`` by Welch's t,
+        in points.
+    """
+    published = dict(list(read_table(GRIDS["variants"].name).groupby("cell")))
+    (reference, *others), rows = cells, {}
+    for name, column in product(others, APPLIED):
+        one, other = (published[each][column] for each in (name, reference))
+        interval = stats.ttest_ind(one, other, equal_var=False).confidence_interval()
+        rows[name, APPLIED[column]] = (one.mean() - other.mean(), *interval)
+    return 100 * pd.DataFrame(rows, index=["difference", "low", "high"]).T
