@@ -3,7 +3,14 @@
 import numpy as np
 
 from unload import task
-from unload.load.boxes import CONTACT_TOLERANCE, OVERLAP, BoxError, Load, check_rests, check_stacked
+from unload.load.boxes import (
+    CONTACT_TOLERANCE,
+    OVERLAP,
+    BoxError,
+    Load,
+    check_no_overhang,
+    check_supported,
+)
 
 # Drawn for each box: depth of its wall, width, height, in m.
 CONTINUOUS = ((0.3, 0.9), (0.1, 0.6), (0.08, 0.45))
@@ -46,8 +53,8 @@ def own_load(rng: np.random.Generator, kind: str) -> Load:
         labels = {"packages": np.zeros(len(low), int), "walls": walls}
         load = Load((low + high) / 2, high - low, **labels, contact_tolerance=tolerance)
         try:
-            check_stacked(load)
-            check_rests(load)
+            check_supported(load)
+            check_no_overhang(load)
             return load
         except BoxError as error:
             low, high, walls = (np.delete(each, error.boxes, axis=0) for each in (low, high, walls))

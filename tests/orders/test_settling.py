@@ -5,7 +5,7 @@ import pytest
 
 from tests.load.walls import of_corners, own_load
 from unload import stack_load, task
-from unload.load.boxes import BoxError, check_stacked
+from unload.load.boxes import BoxError, check_supported
 from unload.orders.settling import settle as moves
 from unload.orders.settling import uncarried
 
@@ -27,7 +27,7 @@ def test_boxes_that_fit_stay_where_they_are_and_measured_ones_become_a_load(rng,
     assert (settle(low, load.sizes) == low).all()
     measured = low + rng.uniform(-0.002, 0.002, low.shape)
     found = settle(measured, load.sizes)
-    check_stacked(of_corners(found, load.sizes))
+    check_supported(of_corners(found, load.sizes))
     assert abs(found - low)[:, 2].max() < 1e-6, "every box lies where it lay"
     assert abs(found - low).max() < 0.02
 
@@ -57,9 +57,9 @@ def test_larger_faults_are_left_for_a_load_to_refuse(second):
     sizes, low = np.full((2, 3), 0.5), np.array([(0, 0, 0), second], float)
     assert (settle(low, sizes) == low).all()
     with pytest.raises(BoxError):
-        check_stacked(of_corners(low, sizes))
+        check_supported(of_corners(low, sizes))
     if second != (0, -0.006, 1):
-        check_stacked(of_corners(settle(low, sizes, 0.01), sizes))
+        check_supported(of_corners(settle(low, sizes, 0.01), sizes))
 
 
 @pytest.mark.parametrize(

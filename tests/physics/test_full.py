@@ -24,7 +24,7 @@ def test_what_a_full_lift_leaves_behind(boxes, after_pick, item, restored):
     assert (physics.lift(item) >= task.LIFT_THRESHOLD) == (item == 2)
     moved = np.abs(physics.positions() - load.positions).max()
     assert moved == 0 if restored else moved > 0.005
-    assert physics.exact == (after_pick == "restore")
+    assert physics.restores == (after_pick == "restore")
 
 
 def test_a_restored_full_world_repeats_its_answers():

@@ -26,7 +26,7 @@ from unload import task
 from unload.env import observation
 from unload.env.equalization import TIES
 from unload.env.observation import MOST_NOISE
-from unload.load.boxes import Load, check_stacked
+from unload.load.boxes import Load, check_supported
 from unload.support import checks
 
 _MOST_ENVS = 2**16  # several GB
@@ -39,7 +39,7 @@ def check_options(options: dict | None, known: tuple[str, ...]) -> dict[str, Loa
     for name, value in options.items():
         if name not in known:
             raise ValueError(f"options is {options!r}; expected {', '.join(known) or 'none'}")
-        check_stacked(value)
+        check_supported(value)
     return dict(options)
 
 

@@ -143,7 +143,7 @@ class ContainerEnv(PickingEnv):
         ValueError.
         """
         self._check_started()
-        if not self.physics.exact:
+        if not self.physics.restores:
             raise ValueError("lifts move other boxes; expected a physics that restores them")
         return self._envs.liftable()[0]
 
@@ -176,7 +176,7 @@ class _OneContainer(ContainerVectorEnv):
     def _put_load(self, env: int, load: Load, noise: np.ndarray) -> None:
         self.physics.reset(load)
         self._failed = np.zeros(len(load), bool)
-        self._noise = noise if self.physics.exact else np.zeros_like(noise)
+        self._noise = noise if self.physics.restores else np.zeros_like(noise)
         super()._put_load(env, load, self._noise)
 
     def _pick(
@@ -191,7 +191,7 @@ class _OneContainer(ContainerVectorEnv):
             self._failed[item] = True
 
         # A lift may have moved other boxes. Then all are seen anew; what has failed stays so.
-        if not self.physics.exact:
+        if not self.physics.restores:
             present, visible = np.flatnonzero(self.physics.present), self._containers.visible[0]
             self._show_items(0, present, self.observed_positions(), self.physics.load)
             self._containers.masks[0] &= ~self._failed[visible]

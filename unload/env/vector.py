@@ -10,7 +10,7 @@ from unload.env import observation
 from unload.env.base import PickingVectorEnv
 from unload.env.observation import drift, scale
 from unload.fast import containers
-from unload.load.boxes import Load, check_rests, check_stack, check_stacked
+from unload.load.boxes import Load, check_no_overhang, check_stack, check_supported
 from unload.load.substacks import stack_load
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import situation_in
@@ -91,9 +91,9 @@ class ContainerVectorEnv(PickingVectorEnv):
             # The paper's loads stand and have no overhangs, as they are made. Lifts that follow
             # contacts alone would pull a box through one that hangs over it.
             if load is not None or self.stack is not stack_load:
-                check_stacked(chosen, "load" if load is not None else "what stack returned")
+                check_supported(chosen, "load" if load is not None else "what stack returned")
                 if isinstance(self.physics, LocalPhysics):
-                    check_rests(chosen)
+                    check_no_overhang(chosen)
             self._put_load(env, chosen, drift(len(chosen), self.position_noise, rng))
 
     def _put_load(self, env: int, load: Load, noise: np.ndarray) -> None:

@@ -199,7 +199,7 @@ def check_load(load: object, name: str = "load") -> None:
     checks.instance(name, load, Load, "an unload.Load")
 
 
-def check_stacked(load: Load, name: str = "load") -> None:
+def check_supported(load: Load, name: str = "load") -> None:
     """Raise unless ``load`` is a ``Load`` whose boxes stand on the floor or on each other.
 
     A box over a gap would not press on the one below.
@@ -214,7 +214,7 @@ def check_stacked(load: Load, name: str = "load") -> None:
         raise BoxError(aloft, f"{place}; {wanted}")
 
 
-def check_rests(load: Load) -> None:
+def check_no_overhang(load: Load) -> None:
     """Raise BoxError where a box hangs over another one on which it does not rest, directly or not.
 
     A lift that follows contacts alone would pull the lower one through the upper one.

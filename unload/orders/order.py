@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pandas as pd
 
-from unload.load.boxes import OVERLAP, Load, check_stacked
+from unload.load.boxes import OVERLAP, Load, check_supported
 from unload.support import checks
 
 Rule = Callable[[Load, np.ndarray], Sequence[np.ndarray]]
@@ -58,7 +58,7 @@ def picking_order(load: Load, by: str | None = None, rule: Rule | None = None) -
         TypeError, ValueError: an argument is not as described, or ``rule`` returns other than
             keys.
     """
-    check_stacked(load)
+    check_supported(load)
     if rule is None:
         rule = reachable if by is None else _by_stop(load, by)
     elif by is not None:

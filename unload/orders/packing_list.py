@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from unload import task
-from unload.load.boxes import CONTACT_TOLERANCE, LARGEST_TOLERANCE, BoxError, Load, check_stacked
+from unload.load.boxes import CONTACT_TOLERANCE, LARGEST_TOLERANCE, BoxError, Load, check_supported
 from unload.orders.settling import settle, uncarried
 from unload.support import checks, files
 
@@ -144,7 +144,7 @@ def read_load(
             extras={str(n): _extra(table[n]) for what, n in names.items() if what not in read},
             contact_tolerance=max(tolerance, CONTACT_TOLERANCE),
         )
-        check_stacked(load)
+        check_supported(load)
     except BoxError as error:
         outside = np.abs(centres - container / 2) + sizes / 2 - container / 2
         argument = "container" if outside.max() > LARGEST_TOLERANCE else "tolerance"

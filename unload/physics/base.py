@@ -18,7 +18,7 @@ class Physics(ABC):
     """A container whose items can be lifted.
 
     Attributes:
-        exact: True where a lift leaves all other boxes exactly where they were.
+        restores: True where a lift leaves all other boxes exactly where they were.
         load: the load, None before the first ``reset``.
         present: (n,) bool, False for items that have been removed.
 
@@ -28,7 +28,7 @@ class Physics(ABC):
         ValueError: the item does not exist or has been removed.
     """
 
-    exact = True
+    restores = True
 
     def __init__(self) -> None:
         self.load: Load | None = None

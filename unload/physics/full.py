@@ -32,7 +32,7 @@ class FullPhysics(Physics):
         checks.one_of("after_pick", after_pick, ("restore", "keep"))
         super().__init__()
         self.after_pick = after_pick
-        self.exact = after_pick == "restore"
+        self.restores = after_pick == "restore"
 
     def _reset(self, load: Load) -> None:
         # Rigid bodies are twice as fast to lift, but moving them far, as putting boxes back does,

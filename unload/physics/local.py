@@ -3,7 +3,7 @@
 import numpy as np
 
 from unload import task
-from unload.load.boxes import Load, check_rests
+from unload.load.boxes import Load, check_no_overhang
 from unload.physics import mujoco
 from unload.physics.base import Physics
 from unload.physics.bullet import ENGINES, SETTINGS, World, engine_of, slim
@@ -64,7 +64,7 @@ class LocalPhysics(Physics):
                 world.remove(body)
 
     def _reset(self, load: Load) -> None:
-        check_rests(load)
+        check_no_overhang(load)
         self.surroundings = Surroundings(load, self.present)
 
     def _lift(self, item: int) -> float:
