@@ -1,12 +1,16 @@
 """The project's commands, also where there is no make: python make.py figures (or test, lab, …).
 
 Needs Python 3.11 to 3.14 and nothing else: the first command makes the environment, ``.venv``.
+Any of these Pythons uses it then; to have it made of another one, remove it.
 What follows a name is handed on, as in python make.py test -k lifts. The Makefile calls this file.
 """
+
+# Python 3.6 must still read this file, to say which Python is needed: annotations are names alone.
 
 import hashlib
 import os
 import platform
+import shutil
 import subprocess
 import sys
 import venv
@@ -15,8 +19,14 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
 PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-PROMPT = "unload"  # of an activated environment; says, too, that it was made here
+MARK = VENV / "made-by-make"  # nothing is removed from a folder without it
+STAMP = VENV / "ready"  # says what is installed
 PIP = ("-m", "pip", "install", "--quiet", "--disable-pip-version-check")
+EXTRAS = ("book", "browser")  # of pyproject.toml; the Makefile has them installed when needed
+# Variables with which pip finds or puts packages elsewhere, or installs less than it is told to.
+# Those that say where it gets packages from are the user's.
+ELSEWHERE = ("PYTHONPATH", "PIP_PREFIX", "PIP_PYTHON", "PIP_ROOT", "PIP_TARGET", "PIP_USER")
+ELSEWHERE += ("PIP_DRY_RUN", "PIP_NO_DEPS")
 # A process a core, eight at most, because each takes 1 GB.
 PYTEST = ("-m", "pytest", "-n", "logical", "--maxprocesses", "8", "--dist", "loadfile")
 # Left out: tests marked slow; those that compile anew, kill runs or simulate every box, by name;
@@ -42,64 +52,89 @@ def main(name: str = "", *more: str) -> None:
         sys.exit(f"{__doc__}\nCommands: {', '.join(COMMANDS)}, ready")
     if not (3, 11) <= sys.version_info[:2] <= (3, 14):
         sys.exit(f"{sys.executable} is Python {platform.python_version()}; expected 3.11 to 3.14")
-    make_ready()
-    if name == "ready":
-        for extra in more:
-            make_ready(extra)
+    make_ready(*(more if name == "ready" else ()))
     for arguments in COMMANDS.get(name, ()):
         last = arguments is COMMANDS[name][-1]
         run(*arguments, *(more if last else ()))
 
 
-def run(*arguments: str) -> None:
-    """Run the environment's Python, and end with it if it fails."""
+def run(*arguments: str, without: tuple = ()) -> None:
+    """Run the environment's Python without these variables, and end with it if it fails."""
+    environment = {name: os.environ[name] for name in os.environ if name.upper() not in without}
     # Its text is UTF-8, on Windows, too.
-    environment = os.environ | {"PYTHONUTF8": "1"}
+    environment["PYTHONUTF8"] = "1"
     done = subprocess.run([str(PYTHON), *arguments], cwd=ROOT, env=environment)
     if done.returncode:
         sys.exit(done.returncode)
 
 
-def make_ready(extra: str | None = None) -> None:
-    """Install what the two files name, and then an extra, unless this has been done.
+def make_ready(*extras: str) -> None:
+    """Install what the two files name, and then the extras, unless this has been done.
 
-    A file in the environment says what was done, and for which checkout and Python.
+    The stamp's lines say of which Python and folder the environment is, and what was installed. It
+    is away while pip runs, because pip takes packages that it left half installed for whole: an
+    environment without a stamp is made again.
     """
-    wanted = hashlib.sha256(f"{sys.version} {sys.base_prefix} {ROOT}".encode())
+    if not {*extras} <= {*EXTRAS}:
+        sys.exit(f"ready takes {' and '.join(EXTRAS)} alone; got {' '.join(extras)}")
+    files = hashlib.sha256()
     for name in ("environment.txt", "pyproject.toml"):
-        wanted.update((ROOT / name).read_bytes())
-    stamp = VENV / ("ready" if extra is None else f"ready-{extra}")
-    done = stamp.read_text(encoding="utf-8") if stamp.exists() else ""
-    if done == wanted.hexdigest() and PYTHON.exists():
-        return
-    if extra is None:
+        files.update((ROOT / name).read_bytes())
+    base = files.hexdigest()
+    steps = {base: [("-r", "environment.txt"), ("--no-deps", "--editable", ".")]}
+    for extra in extras:
+        steps[extra] = [("-c", "environment.txt", "--editable", f".[{extra}]")]
+
+    python = describe_python()
+    stamp = STAMP.read_bytes() if STAMP.is_file() else b""
+    done = stamp.decode(errors="replace").splitlines()
+    if done[:1] != [python]:
         make_environment()
-        run(*PIP, "-r", "environment.txt")
-        run(*PIP, "--no-deps", "--editable", ".")
-    else:
-        run(*PIP, "-c", "environment.txt", "--editable", f".[{extra}]")
-    # Last, so that an installation that was broken off is done again.
-    stamp.write_text(wanted.hexdigest(), encoding="utf-8")
+        done = [describe_python()]
+    elif python.split()[0] != "{}.{}".format(*sys.version_info):
+        print(f"{VENV} is of Python {python.split()[0]}, which is used")
+    if base not in done:
+        done = done[:1]
+    for step in steps:
+        if step not in done:
+            STAMP.unlink(missing_ok=True)
+            for arguments in steps[step]:
+                run(*PIP, *arguments, without=ELSEWHERE)
+            done.append(step)
+            STAMP.write_text("\n".join(done), encoding="utf-8")
+
+
+def describe_python() -> str:
+    """Version and folder of the environment's Python, as it says; nothing where it does not run."""
+    code = "import sys; print('%d.%d' % sys.version_info[:2], ascii(sys.prefix))"
+    try:
+        done = subprocess.run([str(PYTHON), "-I", "-c", code], capture_output=True, text=True)
+    except OSError:  # it is gone, or of another machine
+        return ""
+    return done.stdout.strip()
 
 
 def make_environment() -> None:
-    """Make ``.venv``, unless it works; one that was not made by this function is not cleared."""
-    config = VENV / "pyvenv.cfg"
-    there = config.read_text(encoding="utf-8") if config.exists() else ""
-    if works(there):
-        return
-    foreign = there and f"prompt = {PROMPT!r}" not in there
-    if foreign or VENV.is_symlink() or (VENV / "conda-meta").exists():
+    """Make ``.venv``, in place of what this function made before; anything else is left alone."""
+    there = VENV.exists() and (not VENV.is_dir() or any(VENV.iterdir()))
+    if VENV.is_symlink() or there and not MARK.exists():
         sys.exit(
-            f"{VENV} does not work with Python {platform.python_version()} in this folder, and was "
-            "not made by make.py, which therefore leaves it alone; move it away, and try again"
+            f"{VENV} was not made by this make.py, which therefore leaves it alone; remove or "
+            "rename it, and try again"
         )
     if there:
         print(f"Making {VENV} again: it is of another folder or Python, or was not finished")
-    config.unlink(missing_ok=True)  # first: a folder without it is known to be half cleared
+    VENV.mkdir(exist_ok=True)
+    MARK.touch()
+    STAMP.unlink(missing_ok=True)  # first: what is half cleared is not finished
+    for path in VENV.iterdir():
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        elif path != MARK:
+            path.unlink()
     try:
         # A copy of some Pythons, such as Homebrew's, does not start; Windows has few links.
-        venv.create(VENV, clear=True, symlinks=os.name != "nt", with_pip=True, prompt=PROMPT)
+        venv.create(VENV, symlinks=os.name != "nt", with_pip=True, prompt="unload")
     except subprocess.CalledProcessError as error:
         print((error.output or b"").decode(errors="replace"), file=sys.stderr)
         sys.exit(
@@ -108,19 +143,10 @@ def make_environment() -> None:
         )
 
 
-def works(config: str) -> bool:
-    """Whether ``.venv``, with such a configuration, was made here for this Python, and has pip."""
-    if f"version = {platform.python_version()}\n" not in config or f" {VENV}\n" not in config:
-        return False
-    pip = [str(PYTHON), "-m", "pip", "show", "--quiet", "pip"]
-    try:
-        return subprocess.run(pip, capture_output=True).returncode == 0
-    except OSError:  # its Python is gone, or of another machine
-        return False
-
-
 if __name__ == "__main__":
     try:
         main(*sys.argv[1:])
     except KeyboardInterrupt:
         sys.exit(130)
+    except (OSError, ValueError) as error:  # of files; venv's, of a path that it refuses
+        sys.exit(f"make.py cannot go on: {error}")
