@@ -73,7 +73,7 @@ def make_ready(*extras: str) -> None:
 
     The stamp's lines say of which Python and folder the environment is, and what was installed. It
     is away while pip runs, because pip takes packages that it left half installed for whole: an
-    environment without a stamp is made again.
+    environment without a stamp, where pip was stopped, is made again.
     """
     if not {*extras} <= {*EXTRAS}:
         sys.exit(f"ready takes {' and '.join(EXTRAS)} alone; got {' '.join(extras)}")
@@ -97,9 +97,15 @@ def make_ready(*extras: str) -> None:
         done = done[:1]
     for step in steps:
         if step not in done:
+            before = STAMP.read_bytes() if STAMP.is_file() else b""
             STAMP.unlink(missing_ok=True)
             for arguments in steps[step]:
-                run(*PIP, *arguments, without=ELSEWHERE)
+                try:
+                    run(*PIP, *arguments, without=ELSEWHERE)
+                except SystemExit:  # pip itself gave up, without a network say: nothing is half done
+                    if before:
+                        STAMP.write_bytes(before)
+                    raise
             done.append(step)
             STAMP.write_text("\n".join(done), encoding="utf-8")
 

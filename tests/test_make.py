@@ -171,6 +171,16 @@ def test_an_environment_is_made_again_where_pip_was_broken_off(made, monkeypatch
     assert len(made) == 1 and "was not finished" in capfd.readouterr().out
 
 
+def test_an_environment_stays_where_pip_itself_gives_up(made, monkeypatch):
+    """Without a network, say."""
+    make.main("ready")
+    with monkeypatch.context() as patch, pytest.raises(SystemExit):
+        patch.setattr(make, "run", Mock(side_effect=SystemExit(1)))
+        make.main("ready", "book")
+    make.main("ready")
+    assert made == [make.VENV]
+
+
 def test_an_environment_is_made_again_where_it_was_half_made_or_half_removed(made, monkeypatch):
     for owner, name in ((make.venv, "create"), (make.shutil, "rmtree")):
         make.main("ready")
