@@ -102,7 +102,7 @@ def make_ready(*extras: str) -> None:
             for arguments in steps[step]:
                 try:
                     run(*PIP, *arguments, without=ELSEWHERE)
-                except SystemExit:  # pip itself gave up, without a network say: nothing is half done
+                except SystemExit:  # pip itself gave up: nothing is half done
                     if before:
                         STAMP.write_bytes(before)
                     raise
