@@ -65,7 +65,7 @@ def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Resu
 
     Returns:
         The answer and its record, as they are read back; tuples have become lists, and NumPy's
-        numbers Python's.
+        scalars Python's.
 
     Raises:
         TypeError: the answer has something else, be it a subclass of these.
@@ -107,12 +107,12 @@ def _storable(value: Any, arrays: dict[str, np.ndarray]) -> Any:
         name = f"array {len(arrays)}"
         arrays[name] = value
         return {ARRAY: name}
-    found = kind.__name__
+    found = f"a {kind.__name__}"
     if kind is dict:
-        found = f"dict by {[*value]}"
+        found = f"a dict by {[*value]}"
     elif kind is np.ndarray:
-        found = f"array of {value.dtype}"
-    raise TypeError(f"an answer holds a {found}; expected arrays and what JSON can hold")
+        found = f"an array of {value.dtype}"
+    raise TypeError(f"an answer holds {found}; expected arrays and what JSON can hold")
 
 
 def _read_answer(path: Path) -> Result:
@@ -131,7 +131,7 @@ def code_of(value: Any) -> str:
     """Digest of a value, in which a function or class counts by its name and its module's file.
 
     Files that this module imports do not count: for those of ``unload`` the fingerprints stand, and
-    what an answer owes to others belongs into its question.
+    what an answer owes to others belongs in its question.
 
     Raises:
         TypeError: a function is not what its module holds under its name, so that others may share

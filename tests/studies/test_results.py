@@ -71,7 +71,7 @@ def test_an_answer_to_another_question_is_not_taken(tmp_path, asked):
     ],
 )
 def test_an_answer_that_would_not_be_read_back_as_it_was_is_refused(tmp_path, value, found):
-    with pytest.raises(TypeError, match=f"an answer holds a {found}; expected"):
+    with pytest.raises(TypeError, match=f"an answer holds an? {found}; expected"):
         kept(tmp_path, {}, lambda: [value])
     assert not [*tmp_path.glob("*.npz")]
 
