@@ -2,8 +2,8 @@
 
 One is a digest of what short runs or some lifts yield. As long as it stays the same, the code still
 trains or lifts as it did when a result was made; a result of another fingerprint would come out
-otherwise today. That of training is published, that of lifts is a part of what kept answers are
-known by, see ``results.keep_all``.
+otherwise today. Both are a part of what kept answers are known by, see ``results.keep_all``, and
+that of training is published.
 """
 
 from collections.abc import Callable, Iterable
@@ -21,8 +21,10 @@ from unload.agent.training import Training, train
 from unload.load.substacks import stack_load
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
+from unload.physics.table import TablePhysics
 
-LIFTED = 12  # of the boxes of a wall from above, every twelfth
+# Of the boxes of a wall from above, all or every twelfth, because simulating takes long.
+LIFTED = {TablePhysics: 1, LocalPhysics: 12, FullPhysics: 12}
 
 
 def training_fingerprint(networks: Iterable[str | Callable] = ("peq",)) -> str:
@@ -81,15 +83,15 @@ def _curves(network: str) -> str:
 def physics_fingerprint() -> str:
     """Digest of lifts in a container of one wall, 16 hexadecimal digits.
 
-    It covers the load, the engine that decides here, and the physics ``local``, which tables are
-    filled by, and ``full``. How far a box moved is rounded to three digits.
+    It covers the load, the engine that decides here, and the physics ``table``, empty at first,
+    ``local``, which fills it, and ``full``. How far a box moved is rounded to three digits.
     """
     digest = blake2b(digest_size=8)
     load = stack_load(np.random.default_rng(0), walls=1)
-    for kind in (LocalPhysics, FullPhysics):
+    for kind, step in LIFTED.items():
         physics = kind()
         physics.reset(load)
-        for item in np.argsort(-load.positions[:, 2], kind="stable")[::LIFTED]:
+        for item in np.argsort(-load.positions[:, 2], kind="stable")[::step]:
             digest.update(f"{physics.lift(int(item)):.3g} ".encode())
         physics.close()
     return digest.hexdigest()

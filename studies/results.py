@@ -15,8 +15,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
-from inspect import getsourcefile, isclass, isfunction
+from inspect import getsourcefile
+from operator import attrgetter
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import joblib
@@ -27,7 +29,7 @@ from joblib import Parallel, delayed
 from tqdm import tqdm
 
 from studies import paths
-from studies.fingerprint import physics_fingerprint
+from studies.fingerprint import physics_fingerprint, training_fingerprint
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import files
 
@@ -53,25 +55,31 @@ def measured(compute: Callable[[], Any]) -> Result:
 def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Result:
     """The answer to a question, computed once and kept in a file of ``folder``.
 
-    Each has a digest, and one that is damaged is computed again. Nothing is pickled, so that
+    Each has a digest, and one that cannot be read is computed again. Nothing is pickled, so that
     reading a file that somebody else has made runs no code.
 
     Args:
         question: all that the answer depends on: an answer to another question is not taken.
-        compute: gives the answer, of NumPy's arrays and what JSON can hold: lists, dictionaries by
-            text, text, numbers, None.
+        compute: gives the answer, of NumPy's arrays of numbers or text and what JSON can hold:
+            lists, dictionaries by text, text, numbers, None.
 
     Returns:
-        The answer and its record, as they are read back; tuples have become lists.
+        The answer and its record, as they are read back; tuples have become lists, and NumPy's
+        scalars Python's.
 
     Raises:
-        TypeError: the answer has something else.
+        TypeError: the answer has something else, be it a subclass of these.
+        OSError: the folder cannot be made, or a folder with files stands where the answer should.
     """
     path = Path(folder) / f"{joblib.hash(question)}.npz"
+    # What is in the way is found before the computation, which may take hours.
+    path.parent.mkdir(parents=True, exist_ok=True)
     if path.exists():
         try:
             return _read_answer(path)
-        except ValueError as error:
+        except (ValueError, OSError) as error:
+            if path.is_dir():
+                path.rmdir()
             print(f"{error}. It is computed again", file=sys.stderr)
     _write_answer(path, measured(compute))
     return _read_answer(path)
@@ -79,21 +87,32 @@ def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Resu
 
 def _write_answer(path: Path, answer: Result) -> None:
     arrays: dict[str, np.ndarray] = {}
+    text = json.dumps(_storable(answer._asdict(), arrays))
+    with files.locked(path.parent, wait=True):  # another command may ask the same
+        files.write_arrays(path, arrays | {"json": np.frombuffer(text.encode(), np.uint8)})
 
-    def aside(value: Any) -> Any:
-        """What JSON holds of what it cannot hold itself: of an array its name."""
-        if isinstance(value, np.generic):
-            return value.item()
-        if not isinstance(value, np.ndarray):
-            kind = type(value).__name__
-            raise TypeError(f"an answer holds a {kind}; expected arrays and what JSON can hold")
+
+def _storable(value: Any, arrays: dict[str, np.ndarray]) -> Any:
+    """What JSON gives back as it was; of an array its name, under which it is put aside."""
+    if isinstance(value, np.generic) and value.dtype.kind in "biufU":
+        value = value.item()
+    kind = type(value)
+    if kind in (str, int, float, bool, type(None)):
+        return value
+    if kind in (list, tuple):
+        return [_storable(entry, arrays) for entry in value]
+    if kind is dict and ARRAY not in value and {*map(type, value)} <= {str}:
+        return {name: _storable(entry, arrays) for name, entry in value.items()}
+    if kind is np.ndarray and value.dtype.kind in "biufcSU":
         name = f"array {len(arrays)}"
         arrays[name] = value
         return {ARRAY: name}
-
-    text = json.dumps(answer._asdict(), default=aside)
-    with files.locked(path.parent, wait=True):  # another command may ask the same
-        files.write_arrays(path, arrays | {"json": np.frombuffer(text.encode(), np.uint8)})
+    found = f"a {kind.__name__}"
+    if kind is dict:
+        found = f"a dict by {[*value]}"
+    elif kind is np.ndarray:
+        found = f"an array of {value.dtype}"
+    raise TypeError(f"an answer holds {found}; expected arrays and what JSON can hold")
 
 
 def _read_answer(path: Path) -> Result:
@@ -102,13 +121,21 @@ def _read_answer(path: Path) -> Result:
     def resolve(value: dict) -> Any:
         return arrays[value[ARRAY]] if ARRAY in value else value
 
-    return Result(**json.loads(arrays["json"].tobytes(), object_hook=resolve))
+    try:
+        return Result(**json.loads(arrays["json"].tobytes(), object_hook=resolve))
+    except Exception as error:  # another kind of file may hold anything
+        raise ValueError(f"{path} holds no answer: {error!r}") from error
 
 
 def code_of(value: Any) -> str:
     """Digest of a value, in which a function or class counts by its name and its module's file.
 
-    Files that this module imports do not count: the training fingerprint stands for them.
+    Files that this module imports do not count: for those of ``unload`` the fingerprints stand, and
+    what an answer owes to others belongs in its question.
+
+    Raises:
+        TypeError: a function is not what its module holds under its name, so that others may share
+            both: a lambda, one made in a function, a method of an instance; or it is an instance.
     """
     return joblib.hash(_written(value))
 
@@ -122,12 +149,22 @@ def _written(value: Any) -> Any:
     if isinstance(value, dict):
         return {name: _written(entry) for name, entry in value.items()}
     if isinstance(value, torch.nn.Module):
-        return [_written(type(value)), _written(dict(value.state_dict()))]
+        return [_written(type(value)), repr(value), _written(dict(value.state_dict()))]
     if isinstance(value, torch.Tensor):
         return value.detach().cpu().numpy()
-    if isfunction(value) or isclass(value):
-        return [value.__module__, value.__qualname__, files.digest(getsourcefile(value))]
+    if callable(value):
+        module = _module_of(value)
+        return [module.__name__, value.__qualname__, files.digest(getsourcefile(module))]
     return value
+
+
+def _module_of(value: Callable) -> ModuleType:
+    """The module that holds a function or class under its name."""
+    with suppress(AttributeError, KeyError):
+        module = sys.modules[value.__module__]
+        if attrgetter(value.__qualname__)(module) is value:
+            return module
+    raise TypeError(f"{value!r} cannot be found by its name; expected a function of a module")
 
 
 def keep_all(
@@ -137,13 +174,14 @@ def keep_all(
 
     Args:
         place: the folder in ``runs/``.
-        compute: gives an answer; its code is a part of each question, see ``code_of``, and so is
-            the physics.
+        compute: gives an answer; its code is a part of each question, see ``code_of``, and so are
+            the fingerprints of training and of the physics.
         asked: the rest of each question, and the arguments of ``compute``.
         n_jobs: processes.
     """
     folder = paths.RUNS / place
-    code = {"code": code_of(compute), "fingerprint of physics": physics_fingerprint()}
+    code = {"code": code_of(compute), "fingerprint": training_fingerprint()}
+    code["fingerprint of physics"] = physics_fingerprint()
     answers = Parallel(n_jobs, return_as="generator")(
         delayed(kept)(folder, question | code, partial(compute, *arguments))
         for question, arguments in asked

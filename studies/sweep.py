@@ -53,13 +53,14 @@ def run_sweep(
         n_jobs: processes, -1 for one per core; 1 runs all in this process. Dask uses its whole
             cluster.
         changes: what is changed in some of the runs, by name, see ``unload.train``;
-            functions that can be pickled.
+            functions of a module, or partials of them.
 
     Returns:
         One row per run, in the order given, its name as index: ``error`` (what went wrong,
         or empty), ``folder`` of the run, and the configuration's fields.
 
     Raises:
+        TypeError: a change or a network cannot be found by its name, see ``code_of``.
         TimeoutError: the cluster has no worker, and gets none within joblib's
             ``wait_for_workers_timeout``.
         BrokenProcessPool: a process has died, for want of memory, say; call it again to go on.
@@ -68,7 +69,8 @@ def run_sweep(
     folder = Path(folder).absolute()
     runs = Parallel(n_jobs, return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
     changes = dict.fromkeys(configs) | dict(changes or {})
-    jobs = ((name, configs[name], folder / name, changes[name]) for name in configs)
+    codes = {name: _code(changes[name], config.network) for name, config in configs.items()}
+    jobs = ((name, configs[name], folder / name, changes[name], codes[name]) for name in configs)
     errors = {}
     with tqdm(total=len(configs), unit="run", ncols=100, file=sys.stdout) as bar:
         for name, error in runs(delayed(_run)(*job, os.getpid()) for job in jobs):
@@ -82,7 +84,7 @@ def run_sweep(
     return pd.DataFrame(rows, index=pd.Index(configs, name="run"))
 
 
-def _run(name: str, config: TrainConfig, folder: Path, change, sweep: int):
+def _run(name: str, config: TrainConfig, folder: Path, change, code: str | None, sweep: int):
     """Train one configuration; return its name, and the error's text if it failed."""
     start, child = time.monotonic(), os.getppid() == sweep
 
@@ -95,7 +97,8 @@ def _run(name: str, config: TrainConfig, folder: Path, change, sweep: int):
         # A finished run is only read, perhaps where nothing can be written.
         log_path = os.devnull if RunFolder(folder).finished else folder / "log.txt"
         folder.mkdir(parents=True, exist_ok=True)
-        _check_code(folder / "code.json", [change, config.network])
+        if code is not None:
+            _check_code(folder / "code.json", code)
         with open(log_path, "a", encoding="utf-8") as log, one_thread():
             train(config, folder, log, callback=stop_if_alone, change=change, same_code=True)
         if not (folder / "record.json").exists():
@@ -117,12 +120,14 @@ def _orphaned(parent: int) -> bool:
     return os.getppid() != parent
 
 
-def _check_code(path: Path, functions: list) -> None:
-    """Keep a digest of a run's own functions; raise ValueError where the kept one is another."""
+def _code(*functions: object) -> str | None:
+    """The digest of a run's own functions, None if it has none."""
     own = [function for function in functions if callable(function)]
-    if not own:
-        return
-    code = code_of(own)
+    return code_of(own) if own else None
+
+
+def _check_code(path: Path, code: str) -> None:
+    """Keep a digest of a run's own functions; raise ValueError where the kept one is another."""
     if not path.exists():
         files.write_json(path, {"code": code})
     elif files.read_json(path)["code"] != code:

@@ -16,7 +16,7 @@ import pytest
 import torch
 
 import unload
-from studies import paths
+from studies import paths, results
 from unload.physics.situation import Situation, Surroundings
 
 matplotlib.use("Agg")  # without a screen
@@ -82,6 +82,7 @@ def set_in(monkeypatch) -> Callable[..., None]:
 def own_data(tmp_path, set_in) -> Path:
     """A new folder in the place of ``data/``; what experiments keep in ``runs/`` stands in it."""
     set_in(paths, DATA=tmp_path, RUNS=tmp_path / "runs")
+    set_in(results, training_fingerprint=lambda: "f", physics_fingerprint=lambda: "p")
     return tmp_path
 
 

@@ -197,13 +197,14 @@ def run_laboratory(name: str, planned: Cell, seed: int) -> dict:
 
 def choice_data(n_jobs: int = -1) -> None:
     """Write ``ties/choice.csv``: a row per network and way to ask it, see ``evaluate_choice``."""
-    fingerprint, questions = training_fingerprint(), []
-    for name, policy in networks().items():
-        question = {"name": name, "weights": code_of(policy.network), "fingerprint": fingerprint}
-        questions.append((question | LOADS, (name, policy)))
+    questions = [
+        ({"name": name, "weights": code_of(policy.network)} | LOADS, (name, policy))
+        for name, policy in networks().items()
+    ]
     results = keep_all("ties/choice", ask_network, questions, n_jobs)
-    rows = pd.DataFrame([row for result in results for row in result.value])
-    publish("ties/choice", {"choice": rows}, f"{COMMAND} choice", LOADS, results, fingerprint)
+    tables = {"choice": pd.DataFrame([row for result in results for row in result.value])}
+    command, fingerprint = f"{COMMAND} choice", training_fingerprint()
+    publish("ties/choice", tables, command, LOADS, results, fingerprint)
 
 
 def choice_laboratory_data(n_jobs: int = -1) -> None:

@@ -7,8 +7,10 @@ from studies import fingerprint, paths
 from studies.fingerprint import physics_fingerprint, short_runs, training_fingerprint
 from studies.policies.variants import GRIDS
 from unload import PEQNetwork
+from unload.physics import table
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
+from unload.physics.table import TablePhysics
 from unload.support import files
 
 # Folders and files of data/ that rest on no training of the container's agent.
@@ -38,14 +40,16 @@ def test_data_is_of_todays_training():
 
 
 def test_other_lifts_are_of_other_physics(monkeypatch):
-    found = {physics_fingerprint()}
+    monkeypatch.setattr(fingerprint, "LIFTED", {TablePhysics: 1, LocalPhysics: 12, FullPhysics: 90})
+    found = {physics_fingerprint.__wrapped__()}
     assert found == {physics_fingerprint.__wrapped__()}
-    for kind in (LocalPhysics, FullPhysics):
+    others = [(table, "HELD_DOWN", 2), (table, "HELD_DOWN", 4), (table, "FREE_LIFT", 0.1)]
+    others += [(kind, "lift", lambda self, item: 0.1) for kind in (LocalPhysics, FullPhysics)]
+    for owner, name, other in others:
         with monkeypatch.context() as patch:
-            lift = kind.lift
-            patch.setattr(kind, "lift", lambda self, item, lift=lift: 2 * lift(self, item))
+            patch.setattr(owner, name, other)
             found.add(physics_fingerprint.__wrapped__())
-    assert len(found) == 3
+    assert len(found) == 6
 
 
 @pytest.mark.slow

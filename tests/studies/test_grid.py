@@ -136,24 +136,28 @@ def test_a_run_of_other_code_is_reported(configs, tmp_path, monkeypatch):
         assert (sweep.run_sweep(configs, tmp_path, 1, one)["error"] == "").all()
     message = "holds a run that was begun with other code"
     assert sweep.run_sweep(configs, tmp_path, 1, other)["error"].str.contains(message).all()
-    monkeypatch.setattr("studies.results.getsourcefile", lambda function: __file__)
+    with pytest.raises(TypeError, match="cannot be found by its name"):
+        sweep.run_sweep(configs, tmp_path, 1, dict.fromkeys(configs, lambda run: None))
+    monkeypatch.setattr("studies.results.getsourcefile", lambda module: __file__)
     assert sweep.run_sweep(configs, tmp_path, 1, one)["error"].str.contains(message).all()
+
+
+alive = weakref.WeakSet()
+
+
+def circular(run):
+    assert not alive and torch.get_num_threads() == 1
+    alive.add(run.replay)
+    run.replay.owner = run
 
 
 def test_the_memory_of_a_run_is_free_before_the_next_one(configs, tmp_path):
     """Also where a change ties the run in a circle, which reference counts never free."""
-    alive = weakref.WeakSet()
-
-    def change(run):
-        assert not alive and torch.get_num_threads() == 1
-        alive.add(run.replay)
-        run.replay.owner = run
-
     threads = torch.get_num_threads()
     torch.set_num_threads(2)
     gc.disable()
     try:
-        report = sweep.run_sweep(configs, tmp_path, 1, dict.fromkeys(configs, change))
+        report = sweep.run_sweep(configs, tmp_path, 1, dict.fromkeys(configs, circular))
         assert torch.get_num_threads() == 2
     finally:
         gc.enable()
@@ -166,7 +170,7 @@ def test_a_run_whose_sweep_was_killed_stops_with_a_checkpoint(configs, tmp_path,
     parents = itertools.chain([1], itertools.repeat(0))  # the sweep, and nobody once it is gone
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt, match="was killed"):
         patch.setattr(os, "getppid", lambda: next(parents))
-        sweep._run("run", config, tmp_path / "run", None, sweep=1)
+        sweep._run("run", config, tmp_path / "run", None, None, sweep=1)
     assert (tmp_path / "run" / "checkpoint.npz").exists()
     sweep.run_sweep({"run": config}, tmp_path, n_jobs=1)
     assert (tmp_path / "run" / "policy.safetensors").exists()
@@ -181,10 +185,11 @@ def test_a_killed_sweep_is_noticed_on_windows_where_its_number_stays(monkeypatch
         assert sweep._orphaned(os.getppid()) is not alive
 
 
-def test_a_run_that_fails_is_reported_and_traced_and_stops_no_other(configs, tmp_path):
-    def leaning(run):
-        raise RuntimeError("it fell over")
+def leaning(run):
+    raise RuntimeError("it fell over")
 
+
+def test_a_run_that_fails_is_reported_and_traced_and_stops_no_other(configs, tmp_path):
     configs["set/leaning"] = configs["set/run_0"]
     (tmp_path / "set").mkdir()
     (tmp_path / "set/run_0").write_text("a file where the run's folder should be", encoding="utf-8")

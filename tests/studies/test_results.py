@@ -9,10 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from joblib import Parallel, delayed
+from torch import nn
 
-from studies import paths, results
+from studies import paths, results, sweep
 from studies.falls.long import LONG
 from studies.grid import published_runs, read_grid
+from studies.lifts.lift_table import mixed
 from studies.paper.training import PAPER
 from studies.paper.tuning import TUNING
 from studies.policies.variants import GRIDS
@@ -20,6 +22,7 @@ from studies.results import kept, measured, publish, read_provenance, read_table
 from studies.seamless.training import SEAMLESS
 from studies.ties.training import TIES
 from unload.physics.bullet import engine_of
+from unload.support import files
 
 PUBLISHED = {grid.name: grid for grid in (PAPER, TUNING, LONG, SEAMLESS, *GRIDS.values())}
 RECORDED = PUBLISHED | {TIES.name: TIES}  # not all of its runs were made
@@ -50,10 +53,26 @@ def test_an_answer_to_another_question_is_not_taken(tmp_path, asked):
     assert asked.call_count == 2  # neither replaces the other
 
 
-def test_an_answer_that_could_not_be_read_back_is_refused(tmp_path):
-    for value in (pd.DataFrame({"a": [1]}), {1, 2}):
-        with pytest.raises(TypeError, match=f"an answer holds a {type(value).__name__}; expected"):
-            kept(tmp_path, {}, lambda value=value: [value])
+@pytest.mark.parametrize(
+    ("value", "found"),
+    [
+        (pd.DataFrame({"a": [1]}), "DataFrame"),
+        ({1, 2}, "set"),
+        (measured(int), "Result"),
+        (np.timedelta64(1, "ns"), "timedelta64"),
+        ({"a": 1, 2: 1}, r"dict by \['a', 2\]"),
+        ({True: 1}, r"dict by \[True\]"),
+        ({None: 1}, r"dict by \[None\]"),
+        ({"array of this file": "array 0"}, r"dict by \['array of this file'\]"),
+        (np.ma.array([1, 2], mask=[0, 1]), "MaskedArray"),
+        (np.zeros(2, "M8[s]"), r"array of datetime64\[s\]"),
+        (np.array([1, None]), "array of object"),
+        (np.array(["a"], np.dtypes.StringDType()), r"array of StringDType\(\)"),
+    ],
+)
+def test_an_answer_that_would_not_be_read_back_as_it_was_is_refused(tmp_path, value, found):
+    with pytest.raises(TypeError, match=f"an answer holds an? {found}; expected"):
+        kept(tmp_path, {}, lambda: [value])
     assert not [*tmp_path.glob("*.npz")]
 
 
@@ -72,25 +91,73 @@ def test_no_flipped_bit_of_an_answer_changes_it(tmp_path, asked, capfd):
     assert str(kept(tmp_path, {"seed": 1}, partial(asked, value)).value) == str(right)
 
 
-def test_an_answer_of_other_physics_is_not_taken(own_data, set_in):
-    def answer():
-        return next(answers)
-
-    answers = iter("ab")
-    set_in(results, physics_fingerprint=lambda: "this", code_of=str)
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("other", "{}"),
+        ("json", "[1]"),
+        ("json", '{"answer": 1}'),
+        ("json", '{"value": {"array of this file": []}, "record": {}}'),
+        ("json", "[" * 100_000),
+    ],
+)
+def test_a_whole_file_without_an_answer_is_computed_again(tmp_path, asked, capfd, name, text):
     for _ in range(2):
-        assert results.keep_all("some", answer, [({}, ())], 1)[0].value == "a"
-    set_in(results, physics_fingerprint=lambda: "another")
-    assert results.keep_all("some", answer, [({}, ())], 1)[0].value == "b"
+        assert kept(tmp_path, {}, partial(asked, 1)).value == 1
+        (path,) = tmp_path.glob("*.npz")
+        files.write_arrays(path, {name: np.frombuffer(text.encode(), np.uint8)})
+    assert asked.call_count == 2 and "holds no answer" in capfd.readouterr().err
+
+
+def test_what_is_in_the_way_of_an_answer_is_found_before_it_is_computed(tmp_path, asked):
+    kept(tmp_path / "some", {}, partial(asked, 1))
+    (path,) = tmp_path.glob("some/*.npz")
+    path.unlink()
+    (path / "folder").mkdir(parents=True)
+    for folder in (tmp_path / "some", path.with_name("lock")):
+        with pytest.raises(OSError, match=folder.name):
+            kept(folder, {}, partial(asked, 2))
+    assert asked.call_count == 1
+    (path / "folder").rmdir()
+    assert kept(tmp_path / "some", {}, partial(asked, 3)).value == 3
+
+
+@pytest.mark.parametrize("name", ["physics_fingerprint", "training_fingerprint"])
+def test_an_answer_of_another_fingerprint_is_not_taken(own_data, set_in, name):
+    compute = Mock(side_effect="ab")
+    set_in(results, code_of=str)
+    for fingerprint, answer in (("this", "a"), ("this", "a"), ("another", "b")):
+        set_in(results, **{name: Mock(return_value=fingerprint)})
+        assert results.keep_all("some", compute, [({}, ())], 1)[0].value == answer
+
+
+@pytest.mark.parametrize("function", [mixed(len, 0.5), lambda: 1, [].append, Mock()])
+def test_code_that_its_name_does_not_tell_is_refused(function):
+    with pytest.raises(TypeError, match="cannot be found by its name"):
+        results.code_of({"change": [partial(function, 1)]})
+
+
+def test_the_code_of_a_decorated_function_is_its_own(set_in):
+    digest = Mock(return_value="digest")
+    set_in(files, digest=digest)
+    results.code_of(sweep.one_thread)
+    digest.assert_called_once_with(sweep.__file__)
+
+
+def test_the_code_of_a_network_is_more_than_its_weights():
+    layers = nn.Dropout(0.1), nn.Dropout(0.9), nn.ReLU(), nn.Tanh()
+    assert len({results.code_of(nn.Sequential(layer)) for layer in layers}) == len(layers)
+
+
+def ramp(length):
+    return np.arange(length)
+
+
+def falling(length):
+    return -np.arange(length)
 
 
 def test_answers_are_kept_for_the_code_that_gives_them(own_data, capsys):
-    def ramp(length):
-        return np.arange(length)
-
-    def falling(length):
-        return -np.arange(length)
-
     asked = [({"length": length}, (length,)) for length in (2, 3)]
     for compute, ramps in ((ramp, [[0, 1], [0, 1, 2]]), (falling, [[0, -1], [0, -1, -2]])):
         answers = results.keep_all("some", compute, asked, 1)

@@ -100,7 +100,6 @@ def test_lift_data_depends_on_the_command_alone(own_data, set_in):
     seeds, reset = [], ContainerVectorEnv.reset
     set_in(ContainerVectorEnv, reset=lambda env, seed: seeds.append(seed) or reset(env, seed=seed))
     for name in "ab":
-        set_in(paths, RUNS=own_data / f"runs_{name}")
         set_in(lifts, LIFTS_FILE=own_data / f"{name}.npz")
         lifts.lift_data()
     assert (own_data / "a.npz").read_bytes() == (own_data / "b.npz").read_bytes()
