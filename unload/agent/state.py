@@ -157,7 +157,7 @@ def _is_plain_function(value: Any) -> bool:
     owner = getattr(value, "__self__", None)  # of a built-in function its module
     known = type(owner).__module__.partition(".")[0] == "unload"
     bound = not (owner is None or known or isinstance(owner, (ModuleType, type, *PARTS)))
-    return callable(value) and room in ("builtins", "numpy", "unload") and not bound
+    return callable(value) and room in ("builtins", "functools", "numpy", "unload") and not bound
 
 
 def _place_in_memory(value: Any) -> tuple[int, int]:
