@@ -125,9 +125,9 @@ def keep_cells(
     place: str, cells: Mapping[str, Cell], n_jobs: int, compute: Callable[..., dict] = run_cell
 ) -> list[Result]:
     """What ``compute`` returns of the name, the cell and each seed of some cells, see ``kept``."""
-    asked, fingerprint = [], training_fingerprint()
+    asked = []
     for name, cell in cells.items():
-        question = {"cell": name, "change": code_of(cell.change), "fingerprint": fingerprint}
+        question = {"cell": name, "change": code_of(cell.change)}
         for seed in cell.seeds:
             config = replace(cell.config, seed=seed).plain()
             asked.append((question | config, (name, cell, seed)))

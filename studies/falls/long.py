@@ -64,7 +64,7 @@ def falls_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
 def trace_data(n_jobs: int = -1) -> None:
     """Trace runs with the mask, every 32,000 picks: ``falls/long_trace.csv``."""
     fingerprint = training_fingerprint()
-    question = {"every": TRACE_EVERY, "fingerprint": fingerprint}
+    question = {"every": TRACE_EVERY}
     configs = [replace(CONFIG, seed=seed) for seed in TRACED_SEEDS]
     asked = [(question | config.plain(), (config,)) for config in configs]
     results = keep_all("falls/trace", _trace, asked, n_jobs)
@@ -99,7 +99,6 @@ def published_data(n_jobs: int = -1) -> None:
     for name, policy in published_networks((PAPER, LONG)).items():
         config, network = replace(configs[cell_of(name)], mask=True), policy.network
         question = {"name": name, "weights": code_of(network), **config.plain(), **LOADS}
-        question["fingerprint"] = fingerprint
         asked.append((question, (name, config, network)))
     results = keep_all("published", _judge, asked, n_jobs)
     tables = {"published": pd.DataFrame([result.value for result in results])[COLUMNS]}
