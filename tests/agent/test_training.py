@@ -165,6 +165,10 @@ def test_a_pipe_is_refused(tmp_path):
         train(TrainConfig(**CONTAINER), tmp_path, progress=False)
 
 
+def test_a_policy_before_the_first_point_has_no_msr():
+    assert Training(TrainConfig(**CONTAINER)).policy().card["msr"] == {}
+
+
 def test_a_folder_in_use_is_refused(tmp_path):
     message = "in use by another process"
     with files.locked(tmp_path), pytest.raises(RuntimeError, match=message):
