@@ -23,9 +23,8 @@ UPPER_LIMITS = {
     "position_noise": MOST_NOISE, "epsilon_init": 1.0, "epsilon_final": 1.0, "gamma": 1.0,
     "learning_rate": 1e37,  # Adam's steps have to fit into float32
 }  # fmt: skip
-EXPLORATION_FRACTION = (
-    0.5  # K_ε / K, the share of the picks over which exploration falls (Sec. IV-B)
-)
+# K_ε / K, the share of the picks over which exploration falls (Sec. IV-B).
+EXPLORATION_FRACTION = 0.5
 
 
 def plain(value: Any) -> Any:

@@ -249,9 +249,7 @@ def _finish(
     )  # fmt: skip
     try:
         while not rollout.finished:
-            step_complete = (
-                False  # an error in a step leaves it half done, and nothing can be saved then
-            )
+            step_complete = False  # after an error in a step nothing can be saved
             run.step()
             step_complete = True
             bar.update(run.config.num_envs)

@@ -145,9 +145,8 @@ def add_chunks(
                 chunk_sums[chunk, 3 * f + axis] = block[_GRADIENT + axis * _BLOCK + place]
             chunk_sums[chunk, 3 * n + f] = block[_GRADIENT + _CONSTANT + place]
             for kind in range(4):
-                chunk_sums[chunk, (4 + kind) * n + f] = block[
-                    _SCORE_GRADIENT + kind * _BLOCK + place
-                ]
+                kind_place = _SCORE_GRADIENT + kind * _BLOCK + place
+                chunk_sums[chunk, (4 + kind) * n + f] = block[kind_place]
         chunk_sums[chunk, 8 * n], chunk_sums[chunk, 8 * n + 1] = sum_slopes, sum_losses
         chunk = _next_number(counter)
 

@@ -32,12 +32,10 @@ def settle(
     # From the floor upwards, each box sinks or rises onto the highest one below it.
     top, order = high[:, 2].copy(), np.argsort(low[:, 2], kind="stable")
     for count, box in enumerate(order):
-        share = np.minimum(high[box], high[order[:count]]) - np.maximum(
-            low[box], low[order[:count]]
-        )
-        under = order[:count][
-            (share[:, :2].min(axis=1) > pair_tolerance) & (share[:, 2] <= pair_tolerance)
-        ]
+        others = order[:count]
+        share = np.minimum(high[box], high[others]) - np.maximum(low[box], low[others])
+        beneath = share[:, :2].min(axis=1) > pair_tolerance
+        under = others[beneath & (share[:, 2] <= pair_tolerance)]
         most = pair_tolerance if under.size else tolerance
         if abs(low[box, 2] - high[under, 2].max(initial=0)) <= most:
             moved[box, 2] = top[under].max(initial=0)

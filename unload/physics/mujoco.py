@@ -12,10 +12,7 @@ from unload.physics.bullet import DAMPING, FRICTION, SETTINGS, TIME_STEP, slim
 from unload.physics.situation import RESOLUTION, Situation
 
 STEP = TIME_STEP / 2  # s; its own contacts are soft, and a shorter step makes them firm enough
-HALF_THICKNESS, HALF_WIDTH = (
-    0.5,
-    4.5,
-)  # m, half of the floor and the side walls across, and along them
+HALF_THICKNESS, HALF_WIDTH = 0.5, 4.5  # m, of the floor and the side walls
 
 
 def settings() -> dict:
@@ -63,14 +60,12 @@ def _described(situation: Situation) -> str:
 
     if situation.floor is not None:
         at = _text("pos", (0, 0, situation.floor * RESOLUTION - HALF_THICKNESS))
-        parts.append(
-            f'<geom type="box" {at} {_text("size", (HALF_WIDTH, HALF_WIDTH, HALF_THICKNESS))}/>'
-        )
+        size = _text("size", (HALF_WIDTH, HALF_WIDTH, HALF_THICKNESS))
+        parts.append(f'<geom type="box" {at} {size}/>')
     for side in situation.sides:
         at = _text("pos", (0, side * RESOLUTION + np.sign(side) * HALF_THICKNESS, 0))
-        parts.append(
-            f'<geom type="box" {at} {_text("size", (HALF_WIDTH, HALF_THICKNESS, HALF_WIDTH))}/>'
-        )
+        size = _text("size", (HALF_WIDTH, HALF_THICKNESS, HALF_WIDTH))
+        parts.append(f'<geom type="box" {at} {size}/>')
 
     # MuJoCo takes the larger friction of two bodies, Bullet their product.
     return f"""<mujoco>
