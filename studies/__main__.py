@@ -8,6 +8,8 @@ from studies.falls import laboratory, long
 from studies.grid import train_grid
 from studies.heap import greed, table
 from studies.lifts import agreement, engines, lift_table
+from studies.mask.cells import MASK
+from studies.order.training import ORDER
 from studies.paper import training, tuning, visible_items
 from studies.policies import comparison, variants
 from studies.results import COMMAND
@@ -72,6 +74,11 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
         "noise at the choice or in the memory, the mask in training: the laboratory",
         choice.choice_laboratory_data, JOBS,
     ),
+    "order": (
+        "the index that sorting returns, in place of the rank", partial(train_grid, ORDER),
+        some(ORDER.cells),
+    ),
+    "mask": ("parts of an episode to learn from", partial(train_grid, MASK), some(MASK.cells)),
     "heap": ("heaps, of which a rake picks several boxes at once", table.heap_data, JOBS),
     "greed": ("heaps pick by pick", greed.greed_data, JOBS),
 }  # fmt: skip

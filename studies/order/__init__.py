@@ -1,0 +1,4 @@
+"""Algorithm 1 to the letter: what an agent learns from the index that sorting returns.
+
+In reading order: ``index`` (the change of a run) and ``training`` (runs of the paper's length).
+"""
