@@ -8,7 +8,9 @@ from studies.falls import laboratory, long
 from studies.grid import train_grid
 from studies.heap import greed, table
 from studies.lifts import agreement, engines, lift_table
+from studies.mask import laboratory as mask_laboratory
 from studies.mask.cells import MASK
+from studies.order import laboratory as order_laboratory
 from studies.order.training import ORDER
 from studies.paper import training, tuning, visible_items
 from studies.policies import comparison, variants
@@ -79,6 +81,12 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
         some(ORDER.cells),
     ),
     "mask": ("parts of an episode to learn from", partial(train_grid, MASK), some(MASK.cells)),
+    "order_laboratory": (
+        "the index that sorting returns: the laboratory", order_laboratory.laboratory_data, JOBS
+    ),
+    "mask_laboratory": (
+        "parts of an episode to learn from: the laboratory", mask_laboratory.laboratory_data, JOBS
+    ),
     "heap": ("heaps, of which a rake picks several boxes at once", table.heap_data, JOBS),
     "greed": ("heaps pick by pick", greed.greed_data, JOBS),
 }  # fmt: skip

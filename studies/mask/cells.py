@@ -46,7 +46,7 @@ def out_of_step(run: Training) -> None:
     envs._picks[:] = np.arange(run.config.num_envs) * picks // run.config.num_envs
 
 
-EARLY = partial(learn_from, fewer_than=25)
+EARLY, LATE = partial(learn_from, fewer_than=25), partial(learn_from, least=100)
 SEEDS = range(80, 83)
 MASK = Grid(
     "mask/runs",
