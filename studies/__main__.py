@@ -9,9 +9,10 @@ from studies.grid import train_grid
 from studies.heap import greed, table
 from studies.lifts import agreement, engines, lift_table
 from studies.mask import laboratory as mask_laboratory
+from studies.mask import training as mask
 from studies.mask.cells import MASK
 from studies.order import laboratory as order_laboratory
-from studies.order.training import ORDER
+from studies.order import training as order
 from studies.paper import training, tuning, visible_items
 from studies.policies import comparison, variants
 from studies.results import COMMAND
@@ -77,10 +78,10 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
         choice.choice_laboratory_data, JOBS,
     ),
     "order": (
-        "the index that sorting returns, in place of the rank", partial(train_grid, ORDER),
-        some(ORDER.cells),
+        "the index that sorting returns, in place of the rank", order.order_data,
+        some(order.ORDER.cells),
     ),
-    "mask": ("parts of an episode to learn from", partial(train_grid, MASK), some(MASK.cells)),
+    "mask": ("parts of an episode to learn from", mask.mask_data, some(MASK.cells)),
     "order_laboratory": (
         "the index that sorting returns: the laboratory", order_laboratory.laboratory_data, JOBS
     ),

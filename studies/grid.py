@@ -10,6 +10,7 @@ A run is called ``<cell>/seed_<seed>``.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,7 +19,16 @@ import torch
 
 from studies import paths
 from studies.fingerprint import training_fingerprint
-from studies.results import joined, read_provenance, read_table, write_provenance, write_table
+from studies.results import (
+    code_of,
+    joined,
+    keep_all,
+    publish,
+    read_provenance,
+    read_table,
+    write_provenance,
+    write_table,
+)
 from studies.sweep import run_sweep
 from unload.agent.checkpoint import RunFolder, settings_of_run
 from unload.agent.config import TrainConfig
@@ -216,6 +226,38 @@ def write_policies(path: str | Path, policies: Mapping[str, Greedy]) -> None:
         tensors |= {f"{name}/{k}": v for k, v in policy.network.state_dict().items()}
         settings[name] = settings_of(policy)
     write_weights(path, "policies", settings, tensors)
+
+
+def ask_policies(
+    grid: Grid, name: str, ask: Callable[..., list[dict]], settings: dict, n_jobs: int = -1
+) -> None:
+    """Write ``data/<name>.csv``: what the published policies of a grid do in fresh containers.
+
+    Args:
+        grid: of the policies.
+        name: of the table, with its folder in ``data/``.
+        ask: is called with a policy and ``settings``, and returns rows; each gets its ``cell``
+            and ``seed``.
+        settings: of the containers.
+        n_jobs: processes.
+    """
+    policies = read_policies(paths.DATA / f"{grid.name}.safetensors")
+    # The weights are part of the question: a policy that was trained again is asked again.
+    asked = [
+        ({"name": run, "weights": code_of(policy.network)} | settings, (policy, settings))
+        for run, policy in policies.items()
+    ]
+    results, rows = keep_all(name, partial(_ask, ask), asked, n_jobs), []
+    for run, result in zip(policies, results):
+        named = {"cell": cell_of(run), "seed": int(run.rpartition("_")[2])}
+        rows += [named | row for row in result.value]
+    tables = {name.rpartition("/")[2]: pd.DataFrame(rows)}
+    publish(name, tables, grid.command, settings, results, training_fingerprint())
+
+
+def _ask(ask: Callable[..., list[dict]], policy: Greedy, settings: dict) -> list[dict]:
+    torch.set_num_threads(1)
+    return ask(policy, **settings)
 
 
 def read_policies(path: str | Path) -> dict[str, Greedy]:

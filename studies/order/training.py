@@ -5,10 +5,14 @@
 ``data/order/PLAN.md`` says what was expected of its cells.
 """
 
-from studies.grid import Grid, cell
-from studies.order.index import see_index
+from collections.abc import Sequence
+
+from studies.grid import Grid, ask_policies, cell, train_grid
+from studies.order.index import see_index, sorted_index
 from studies.paper.training import B2048, CONFIG
 from studies.results import COMMAND
+from studies.ties.choice import LOADS, WAYS, evaluate_choice
+from unload.agent.greedy import Greedy
 
 SEEDS, FEW_SEEDS = range(70, 76), range(70, 73)
 ORDER = Grid(
@@ -21,3 +25,28 @@ ORDER = Grid(
         "index_b2048_no_mask": cell(B2048, range(70, 71), see_index),
     },
 )
+
+
+def order_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
+    """Train the grid, see ``train_grid``; of all cells, let the networks choose, too.
+
+    ``order/choice.csv`` has a row per network and way to ask it, see ``ask_index``.
+    """
+    train_grid(ORDER, cells, n_jobs)
+    if cells is None:
+        ask_policies(ORDER, "order/choice", ask_index, LOADS, n_jobs)
+
+
+def ask_index(policy: Greedy, episodes: int, seed: int) -> list[dict]:
+    """Let a network that sees the index choose with other noise and other masks.
+
+    Returns:
+        Rows of ``noise``, ``mask``, and what ``evaluate_choice`` says but for ``preference``, which
+        asks ranks.
+    """
+    rows = []
+    for noise, mask in WAYS:
+        counts = evaluate_choice(policy, noise, mask, True, episodes, seed, sorted_index)
+        del counts["preference"]
+        rows.append({"noise": noise, "mask": mask} | counts)
+    return rows

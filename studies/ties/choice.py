@@ -45,7 +45,13 @@ COUNTS = ["msr", "failures", "deadlocked", "preference"]
 
 
 def evaluate_choice(
-    policy: Greedy, noise: str, mask: bool, place: bool = True, episodes: int = 100, seed: int = 0
+    policy: Greedy,
+    noise: str,
+    mask: bool,
+    place: bool = True,
+    episodes: int = 100,
+    seed: int = 0,
+    see: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> dict[str, float]:
     """Let a network choose in fresh containers, 500 picks each, and sort its failures.
 
@@ -57,6 +63,7 @@ def evaluate_choice(
         place: whether the network sees x and y; they are 0 if not.
         episodes: number of containers.
         seed: of the loads, which are those of ``unload.evaluate``, and of the noise.
+        see: what the network sees of positions, (batch, 128, 3); what ``policy`` says if None.
 
     Returns:
         ``msr``; the number of ``failures``; of them the ``deadlocked`` ones, whose item had failed
@@ -68,7 +75,10 @@ def evaluate_choice(
     rng, rows = np.random.default_rng(seed), np.arange(episodes)
 
     def choose(positions: np.ndarray, allowed: np.ndarray, ties: str) -> np.ndarray:
-        seen = equalize(positions, ties) if policy.equalize else positions
+        if see is not None:
+            seen = see(positions)
+        else:
+            seen = equalize(positions, ties) if policy.equalize else positions
         return greedy_actions(policy.network, seen if place else without(seen), allowed)
 
     counts = dict.fromkeys(COUNTS, 0)
