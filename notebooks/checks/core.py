@@ -121,6 +121,19 @@ def leaves_the_ranks(change):
     return np.array_equal(unload.equalize(changed[:, None]), unload.equalize(values[:, None]))
 
 
+def makes_order_the_rank(rows_of):
+    """Whether sorting's index is the rank of heights, if rows stand as a function says."""
+    heights = np.random.default_rng(0).uniform(-1, 1, 128)
+    rows = np.asarray(call(rows_of, heights.copy()))
+    if not np.array_equal(np.sort(rows, axis=None), np.arange(len(heights))):
+        return (
+            f"it returns {np.array2string(rows, threshold=8)}; expected each row from 0 to 127 once"
+        )
+    index = np.argsort(heights[rows])
+    differ = (index != np.argsort(index)).sum()
+    return f"index and rank differ in {differ} of 128 rows" if differ else True
+
+
 # Notebook 03
 
 
@@ -232,6 +245,7 @@ EXERCISES = {
     ),
     "02/1": Exercise(function, equalizes, ""),
     "02/2": Exercise(function, leaves_the_ranks, "which functions keep the order of numbers?"),
+    "02/3": Exercise(function, makes_order_the_rank, ""),
     "03/1": Exercise(function, is_the_network, ""),
     "03/2": Exercise(number, lambda score: abs(score - 0.9) < 1e-6, "which pooled numbers change?"),
     "03/3": Exercise(
