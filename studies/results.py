@@ -5,6 +5,7 @@ one is a table in ``data/``, with its provenance in the ``provenance.json`` of i
 settings, code, versions, machine and time.
 """
 
+import ast
 import json
 import os
 import platform
@@ -128,10 +129,11 @@ def _read_answer(path: Path) -> Result:
 
 
 def code_of(value: Any) -> str:
-    """Digest of a value, in which a function or class counts by its name and its module's file.
+    """Digest of a value, in which a function or class counts by its name and its module's files.
 
-    Files that this module imports do not count: for those of ``unload`` the fingerprints stand, and
-    what an answer owes to others belongs in its question.
+    These are the module's own file and all files of the studies that it imports, directly or not,
+    so that an answer is computed again after a change in any of them, also in one that does not
+    matter to it. For ``unload`` the fingerprints stand.
 
     Raises:
         TypeError: a function is not what its module holds under its name, so that others may share
@@ -154,8 +156,31 @@ def _written(value: Any) -> Any:
         return value.detach().cpu().numpy()
     if callable(value):
         module = _module_of(value)
-        return [module.__name__, value.__qualname__, files.digest(getsourcefile(module))]
+        return [module.__name__, value.__qualname__, _files_of(getsourcefile(module))]
     return value
+
+
+@cache
+def _files_of(source: str) -> list[str]:
+    """Digests of a file and of all files of the studies that it imports, directly or not."""
+    found: dict[Path, str] = {}
+    left = [Path(source)]
+    while left:
+        path = left.pop()
+        if path in found or not path.is_file():
+            continue
+        found[path] = files.digest(path)
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = []
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+            for name in names:
+                if name.split(".")[0] == "studies":
+                    place = paths.ROOT / name.replace(".", "/")
+                    left += [place.with_suffix(".py"), place / "__init__.py"]
+    return [found[path] for path in sorted(found)]
 
 
 def _module_of(value: Callable) -> ModuleType:

@@ -211,4 +211,4 @@ def share_interval(count: int, total: int) -> tuple[float, float]:
 def predictions(plan: str) -> pd.Series:
     """What ``data/<plan>/PLAN.md`` predicts in its tables, by names such as ``"A1"``."""
     text = (paths.DATA / plan / "PLAN.md").read_text(encoding="utf-8")
-    return pd.Series(dict(re.findall(r"^\| ([A-Z]\d) \| (.+?) \|", text, re.M)), name="predicted")
+    return pd.Series(dict(re.findall(r"^\| ([A-Z]\d+) \| (.+?) \|", text, re.M)), name="predicted")

@@ -228,6 +228,7 @@ def test_plausible_mistakes_are_named_as_what_they_are():
         ("02/2", lambda values: values, "it keeps the order of values, but changes none of them"),
         ("02/2", np.sum, "of 128 values it makes an array of shape ()"),
         ("02/2", np.negative, "which functions keep the order of numbers?"),
+        ("02/3", lambda heights: np.arange(len(heights)), "index and rank differ in"),
         ("05/2", (0.493, 1.0), "both are right, in the wrong order; expected positions first"),
         ("05/2", (0.9, 0.9), "the preference is along x, c = 0: rule(0, 1)"),
         ("05/3", of_one_container, "expected an array of 2 actions, one a container"),

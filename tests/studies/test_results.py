@@ -14,6 +14,7 @@ from torch import nn
 from studies import paths, results, sweep
 from studies.falls.long import LONG
 from studies.grid import published_runs, read_grid
+from studies.heap import greed, rake
 from studies.lifts.lift_table import mixed
 from studies.paper.training import PAPER
 from studies.paper.tuning import TUNING
@@ -138,10 +139,10 @@ def test_code_that_its_name_does_not_tell_is_refused(function):
 
 
 def test_the_code_of_a_decorated_function_is_its_own(set_in):
-    digest = Mock(return_value="digest")
-    set_in(files, digest=digest)
+    files_of = Mock(return_value=["digest"])
+    set_in(results, _files_of=files_of)
     results.code_of(sweep.one_thread)
-    digest.assert_called_once_with(sweep.__file__)
+    files_of.assert_called_once_with(sweep.__file__)
 
 
 def test_the_code_of_a_network_is_more_than_its_weights():
@@ -244,3 +245,26 @@ def test_all_planned_runs_are_published_in_full_length(name):
     if grid.measure is None:
         last = rows.groupby(["cell", "seed"])["picks"].max()
         assert {config.picks for config in planned.values()} == {*last}
+
+
+def test_the_code_of_a_function_is_that_of_all_that_its_module_imports(tmp_path, set_in):
+    assert files.digest(rake.__file__) in results._files_of(greed.__file__)
+    set_in(results.paths, ROOT=tmp_path)
+    texts = {
+        "a": "from studies.b import x",
+        "b": "import studies.c.d",
+        "c/d": "import numpy",
+        "e": "",
+    }
+    for name, text in texts.items():
+        path = tmp_path / "studies" / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    known = {}
+    for changed in (None, "a", "b", "c/d", "e"):
+        if changed:
+            path = tmp_path / "studies" / f"{changed}.py"
+            path.write_text(path.read_text(encoding="utf-8") + "\nx = 1", encoding="utf-8")
+        results._files_of.cache_clear()
+        known[changed] = tuple(results._files_of(str(tmp_path / "studies/a.py")))
+    assert len(set(known.values())) == 4 and known["e"] == known["c/d"]
