@@ -140,6 +140,7 @@ def _state(run: Run, now: int) -> tuple[str, str | tuple]:
 
 
 def _dark(meaning: str) -> tuple:
+    """The colour of text about boxes of a meaning."""
     return tuple(DARK * share for share in COLOURS[meaning])
 
 

@@ -226,6 +226,17 @@ def test_the_page(chromium, size):
     context.close()
 
 
+def test_a_copy_alone_says_where_its_links_lead(chromium):
+    BUILD.mkdir(parents=True, exist_ok=True)
+    copy = BUILD / "alone.html"
+    shutil.copy(PAGE, copy)
+    page = chromium.new_page()
+    page.goto(copy.as_uri())
+    expect(page.locator("nav a[href]")).to_have_text(["Paper"])
+    expect(page.locator("nav")).to_contain_text("(notebook 06 in the repository)")
+    page.close()
+
+
 def take_steps(page: Page, stem: Path) -> None:
     """Take the page's steps, and check what it says of each; keep a picture of each."""
 

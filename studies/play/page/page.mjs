@@ -32,9 +32,9 @@ element("features").append(...tiles);
 for (const link of document.querySelectorAll("a[data-file]")) {
   const { file } = link.dataset;
   const [number] = file.match(/\d+/) ?? [];
-  const inside = (folder) => location.pathname.includes(folder);
-  if (inside("/play/")) link.href = `../${file.replace(/\.\w+$/, ".html")}`;
-  else if (inside("/figures/")) link.href = `../${file}`;
+  const folder = location.pathname.split("/").at(-2);
+  if (folder === "play") link.href = `../${file.replace(/\.\w+$/, ".html")}`;
+  else if (folder === "figures") link.href = `../${file}`;
   else if (number) link.append(` (notebook ${number} in the repository)`);
 }
 

@@ -8,8 +8,8 @@ const STEP = 1e-3; // along an axis of the observation
 
 /** The scores that a choice compares, (items); used by `height`, x and y count as 0. */
 export function compared(network, observation, { use }) {
-  const seen = use === "height" ? observation.map((value, i) => (i % 3 === 2 ? value : 0)) : observation;
-  return network.scores(seen);
+  const height = (value, i) => (i % 3 === 2 ? value : 0);
+  return network.scores(use === "height" ? observation.map(height) : observation);
 }
 
 /** The row of the highest score; with `mask`, of those that have not failed. */

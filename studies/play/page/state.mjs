@@ -15,9 +15,8 @@ export const CHOICES = {
   ties: ["Ties", { "by noise": "noise", "by noise, anew": "anew", averaged: "average" },
     "Boxes of equal coordinates are ranked by noise of half a millimetre, drawn once for a load or " +
     "anew at each pick; or they share a rank"],
-  use: ["In use", { "with the mask": "mask", "without it": "no_mask", "by height only": "height" },
-    "How the weights choose in new containers: with the mask; without it; or with it and by height " +
-    "only, so that x and y count as 0"],
+  // In new containers: with the mask, without it, or with it and by height only, x and y being 0.
+  use: ["In use", { mask: "mask", no_mask: "no_mask", height: "height" }],
   picks: ["Picks",
     { "32,000": 32_000, "64,000": 64_000, "96,000": 96_000, "384,000": 384_000 },
     "Length of a run; random picks end after half of it"],
@@ -35,8 +34,8 @@ export const NUMBERS = {
   seed: [2, 2 ** 32 - 1, /^\d+$/, "a whole number from 0 to 4294967295"],
 };
 
-/** What experiments change in the defaults. */
 const RANKS = { sees: "ranks", picks: 96_000 };
+/** What experiments change in the defaults. */
 export const PRESETS = {
   positions: {},
   ranks: RANKS,

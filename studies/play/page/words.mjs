@@ -68,7 +68,7 @@ export function pickVerdict(container, item, success) {
  * @param {object} run its `points` and judgements `frozen`, see training.mjs, `picks`, and
  *   `seconds` of training; `rates` of its weights by their use; whether it is `running`.
  * @param {object} config its settings.
- * @param {object} task its numbers `thresholds` and `errs`.
+ * @param {object} task its numbers `thresholds`, `errs` and `paper_msr`.
  */
 export function runVerdict(run, config, task) {
   const { points, frozen, picks, seconds, running } = run;
@@ -90,7 +90,7 @@ export function runVerdict(run, config, task) {
   if (judged.repeated > STUCK) {
     return `It is stuck: ${percent(judged.repeated)} of its picks repeat one that has just failed.`;
   }
-  const why = misled(latest.slopes, config, task);
+  const why = remark(latest.slopes, config, task);
   const high = rates.findIndex((rate) => rate >= HIGH * top);
   const fell = high >= 0 && rates.slice(high).some((rate) => rate <= LOW * top);
   if (!fell && best - end < WORSE * top) {
@@ -104,9 +104,9 @@ export function runVerdict(run, config, task) {
   return `${what}, ${both}; ${why}.${limit}`;
 }
 
-/** What a network prefers to height, by its slopes; nothing is known of that by the index. */
-function misled(slopes, config, task) {
-  if (config.sees === "index") return "the paper’s agent ends at 60 %";
+/** What a network prefers to height, by its slopes; beside one of the index, the paper's. */
+function remark(slopes, config, task) {
+  if (config.sees === "index") return `the paper’s agent ends at ${percent(task.paper_msr)}`;
   if (slopes[2] <= 0) return "it prefers low boxes";
   const along = preferences(slopes);
   const known = limits(config, task.thresholds);
