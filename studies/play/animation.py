@@ -19,9 +19,11 @@ from unload.support import files
 WIDTH, HEIGHT = 4.4, 4.4  # of one agent's part, in inches at 100 pixels each
 RISE = 0.45  # m, how far a box that is being unloaded is drawn above its place
 STUCK = task.N_VISIBLE  # failed picks in a row after which an agent counts as stuck
-SLOW, STEP = 4, 9  # frames of one pick each at the beginning, and picks per frame at last
+SLOW = 4  # frames of one pick each, at the beginning and when a pick has failed
+ALIKE, STEP = 27, 9  # picks per frame before any pick fails, and later
 FIRST, EARLY, LATE, LAST = 600, 150, 80, 3000  # ms that frames are shown
 FAINT, RAIL = "#6f6f6f", "#e4e4e1"
+DARK = 0.7  # times a box's colour is that of text, to be read on white
 PALETTE = 127  # colours of all frames, besides white
 LEGEND = {"unseen": "unseen", "visible": "visible", "liftable": "unloaded", "failed": "failed"}
 
@@ -51,15 +53,22 @@ def save_unloading(episodes: Mapping[str, Run], path: str | Path) -> list[Image.
         path: of the GIF.
 
     Returns:
-        Its frames in the order of the picks; the file begins with the last one.
+        Its frames in the order of the picks; the file begins with the middle one.
     """
-    counts = picks_of_frames(max(len(run.picks) for run in episodes.values()))
-    frames = [_frame(episodes, *span) for span in zip([0, *counts], counts)]
+    runs = episodes.values()
+    picks = max(len(run.picks) for run in runs)
+    failures = (n for run in runs for n, pick in enumerate(run.picks) if not pick.success)
+    counts = picks_of_frames(picks, min(failures, default=picks))
+    spans = [*zip([0, *counts], counts)]
+    frames = [_frame(episodes, *span) for span in spans]
     palette = _palette(frames)
-    # The end comes first, because a reader who sees one picture alone should see what happens.
-    shown = [frames[-1], *frames[:-1]]
+    durations = [EARLY if now - before == 1 else LATE for before, now in spans]
+    durations[0], durations[-1] = FIRST, LAST
+    # The middle comes first, because who sees one picture alone should see how the agents differ.
+    middle = len(frames) // 2
+    durations = durations[middle:] + durations[:middle]
+    shown = frames[middle:] + frames[:middle]
     first, *others = (frame.quantize(palette=palette, dither=0) for frame in shown)
-    durations = [LAST, FIRST, *[EARLY] * SLOW, *[LATE] * len(frames)][: len(frames)]
     files.write_atomically(
         path,
         lambda file: first.save(
@@ -69,12 +78,16 @@ def save_unloading(episodes: Mapping[str, Run], path: str | Path) -> list[Image.
     return frames
 
 
-def picks_of_frames(picks: int) -> list[int]:
-    """How many picks are over in each frame: none, one more each, then more; the end twice."""
-    counts = list(range(min(SLOW, picks) + 1))
-    while counts[-1] < picks:
-        counts.append(min(picks, counts[-1] + min(STEP, len(counts) - SLOW + 1)))
-    return [*counts, picks]
+def picks_of_frames(picks: int, failed: int) -> list[int]:
+    """How many picks are over in each frame: none, one more each, then more; the end twice.
+
+    Args:
+        picks: number of all.
+        failed: picks before the first that fails, which is where agents come to differ.
+    """
+    slow = [start + number for start in (0, failed) for number in range(SLOW + 1)]
+    counts = {*slow, *range(SLOW, failed, ALIKE), *range(failed + SLOW, picks, STEP)}
+    return [*sorted(count for count in counts if count < picks), picks, picks]
 
 
 def _palette(frames: list[Image.Image]) -> Image.Image:
@@ -118,12 +131,17 @@ def _state(run: Run, now: int) -> tuple[str, str | tuple]:
     count, picks = len(run.picks), run.picks[:now]
     if run.picks[-1].success and now >= count:
         text = f"empty after {count} picks, {count - run.unloaded()} of them failed"
-        return text, COLOURS["liftable"]
+        return text, _dark("liftable")
     same = takewhile(lambda pick: pick.item == picks[-1].item and not pick.success, picks[::-1])
     fails = len(list(same)) + max(0, now - count)
     if fails > 1:
-        return f"deadlock: the same box fails, {fails} times", COLOURS["failed"]
-    return f"pick {now}", FAINT
+        return f"deadlock: the same box fails, {fails} times", _dark("failed")
+    return f"pick {now}, {len(picks) - run.unloaded(now)} failed", FAINT
+
+
+def _dark(meaning: str) -> tuple:
+    """The colour of text about boxes of a meaning."""
+    return tuple(DARK * share for share in COLOURS[meaning])
 
 
 def _boxes(run: Run, before: int, now: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

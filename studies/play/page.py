@@ -16,6 +16,7 @@ from pathlib import Path
 
 from studies import paths
 from studies.falls.laboratory import ERRS, THRESHOLDS
+from studies.statistics import PAPER_MSR
 from unload import task
 from unload.env.observation import POSITION_NOISE, SINK
 from unload.fast.ranking import TIE_TOLERANCE
@@ -50,6 +51,7 @@ def task_numbers() -> dict:
         "columns": columns,
         "thresholds": THRESHOLDS,
         "errs": ERRS,
+        "paper_msr": PAPER_MSR,
     }
 
 

@@ -5,7 +5,7 @@
 
 Copies of the notebooks are run, at reduced counts except for 00. Checked are: no error and
 nothing on stderr; 3D views hold pixels, with a kernel and without; figures under sliders change
-when one is moved, and the score in 00 when a box is clicked. On the page a reader takes the five
+when one is moved, and the score in 00 when a box is clicked. On the page a reader takes the seven
 steps and changes settings. Pictures of views, figures and the page are kept in build/browser/.
 """
 
@@ -216,7 +216,7 @@ def test_the_page(chromium, size):
     page.on("request", lambda request: requests.append(request.url))
     start(page, f"seed={[*SIZES].index(size)}")
     check_size(page, size)
-    take_five_steps(page, BUILD / f"train-{size}")
+    take_steps(page, BUILD / f"train-{size}")
     check_size(page, size)
     if size == "desktop":
         check_settings(page)
@@ -226,11 +226,23 @@ def test_the_page(chromium, size):
     context.close()
 
 
-def take_five_steps(page: Page, stem: Path) -> None:
+def test_a_copy_alone_says_where_its_links_lead(chromium):
+    BUILD.mkdir(parents=True, exist_ok=True)
+    copy = BUILD / "alone.html"
+    shutil.copy(PAGE, copy)
+    page = chromium.new_page()
+    page.goto(copy.as_uri())
+    expect(page.locator("nav a[href]")).to_have_text(["Paper"])
+    expect(page.locator("nav")).to_contain_text("(notebook 06 in the repository)")
+    page.close()
+
+
+def take_steps(page: Page, stem: Path) -> None:
     """Take the page's steps, and check what it says of each; keep a picture of each."""
 
     def ends(step: str, expected: str) -> None:
-        judged = "!run.running && (!run.picks || config.blank in run.rates)"
+        uses = "[config.use, 'mask', 'no_mask'].every((use) => use in run.rates)"
+        judged = f"!run.running && (!run.picks || {uses})"
         expect(page.locator(f"{button(step)}.done")).to_be_attached(timeout=1000 * TRAIN_LIMIT)
         until(page, lambda: page.evaluate(judged), TRAIN_LIMIT)
         page.screenshot(path=f"{stem}-{step}.png", full_page=True)
@@ -242,8 +254,10 @@ def take_five_steps(page: Page, stem: Path) -> None:
     ends("unload", "Unloaded: .* 1 of your 1 picks")
     for step, expected in (
         ("positions", r"It learned: 100 % of its picks in new containers succeed, after \d"),
-        ("paper", "It (fell: best after|got worse: best after|did not|learned)"),
-        ("blank", r"With height alone .* in \d+ % .* with x and y in \d+ %: "),
+        ("ranks", "It (fell: best after|got worse: best after|did not|learned)"),
+        ("height", r"With height alone .* in \d+ % .* with x and y in \d+ %: "),
+        ("index", "It learned in part: "),
+        ("no_mask", r"With the mask these weights succeed in \d+ % of picks, without it in \d+ %"),
         ("shuffled", "It (learned|did not fall): "),
     ):
         page.click(button(step))

@@ -74,17 +74,17 @@ export class Container {
   }
 
   /**
-   * Choose what is observed: positions, or ranks (`equalize`) with `ties` of a kind; and
+   * Choose what is observed: positions, ranks, whose `ties` are of a kind, or the index; and
    * whether walls are `seamless`, so that a free box jams with probability `jam`.
    */
-  show({ equalize, ties, seamless, jam }) {
-    Object.assign(this, { equalize, ties, jam: seamless ? jam : 0 });
+  show({ sees, ties, seamless, jam }) {
+    Object.assign(this, { sees, ties, jam: seamless ? jam : 0 });
     this.look();
   }
 
   /** Update which boxes are visible, nearest first, and the observation of them. */
   look() {
-    const { byDistance, present, task } = this;
+    const { byDistance, present, sees, task, ties } = this;
     this.visible = [];
     for (let i = 0; i < byDistance.length && this.visible.length < task.n_visible; i++) {
       if (present[byDistance[i]]) this.visible.push(byDistance[i]);
@@ -94,10 +94,18 @@ export class Container {
     this.visible.forEach((item, row) => (rows[item] = row));
     this.byAxis.forEach((order, axis) => {
       const visible = order.filter((item) => rows[item] >= 0);
-      const sorted = this.equalize && this.ties === "anew" ? this.sortAnew(visible, axis) : visible;
-      const positions = sorted.map((item) => this.seen[item][axis]);
-      const values = this.equalize ? this.ranks(positions) : positions;
-      sorted.forEach((item, i) => (this.observation[3 * rows[item] + axis] = values[i]));
+      const anew = sees !== "positions" && ties === "anew";
+      const sorted = anew ? this.sortAnew(visible, axis) : visible;
+      const write = (row, value) => (this.observation[3 * row + axis] = value);
+      if (sees === "index") {
+        // As `argsort` returns it: in row r stands which row comes r-th.
+        const last = sorted.length - 1 || 1;
+        sorted.forEach((item, r) => write(r, (2 * rows[item] - last) / last));
+      } else {
+        const positions = sorted.map((item) => this.seen[item][axis]);
+        const values = sees === "ranks" ? this.ranks(positions) : positions;
+        sorted.forEach((item, r) => write(rows[item], values[r]));
+      }
     });
   }
 

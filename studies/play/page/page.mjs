@@ -2,8 +2,7 @@
 
 const element = (id) => document.getElementById(id);
 const task = JSON.parse(element("task").textContent);
-const [canvas, form, presets] = ["canvas", "settings", "presets"].map(element);
-const [steps, plot] = ["steps", "plot"].map(element);
+const [canvas, form, steps, plot] = ["canvas", "settings", "steps", "plot"].map(element);
 const drawing = new Drawing(canvas, task);
 const network = new PEQNetwork(N_FEATURES, new Generator(0)); // its weights come from the worker
 const code = ["library", "worker"].map((id) => element(id).textContent);
@@ -13,7 +12,7 @@ const done = new Set(); // steps
 let config, run, mine, chosen; // settings, the worker's last report, the reader's container, a box
 let number = 0; // of runs, because a report of an earlier one may come late
 let frame; // that will be drawn
-let [step, said] = ["unload", ""]; // the step or preset that is told of, what the last pick did
+let [step, said] = ["unload", ""]; // the step that is told of, what the reader's last pick did
 
 const make = (kind, fields, ...content) => {
   const made = Object.assign(document.createElement(kind), fields);
@@ -21,7 +20,7 @@ const make = (kind, fields, ...content) => {
   return made;
 };
 for (const [name, [text, options, title]] of Object.entries(CHOICES)) {
-  if (name === "blank") continue; // stands beside its numbers
+  if (name === "use") continue; // stands beside its numbers
   const choices = Object.entries(options).map((option) => new Option(...option));
   const select = make("select", { name }, ...choices);
   element("jams").before(make("label", { title }, text, select));
@@ -29,13 +28,14 @@ for (const [name, [text, options, title]] of Object.entries(CHOICES)) {
 const tiles = Array.from({ length: N_FEATURES }, () => make("canvas", {}));
 element("features").append(...tiles);
 
-// Files beside the page: in the repository, or in its site. A copy that stands alone names them.
+// Files beside the page: in the repository, or in its site. A copy that stands alone says where.
 for (const link of document.querySelectorAll("a[data-file]")) {
   const { file } = link.dataset;
-  const inside = (folder) => location.pathname.includes(folder);
-  if (inside("/play/")) link.href = `../${file.replace(/\.\w+$/, ".html")}`;
-  else if (inside("/figures/")) link.href = `../${file}`;
-  else link.title = `In the repository: ${file}`;
+  const [number] = file.match(/\d+/) ?? [];
+  const folder = location.pathname.split("/").at(-2);
+  if (folder === "play") link.href = `../${file.replace(/\.\w+$/, ".html")}`;
+  else if (folder === "figures") link.href = `../${file}`;
+  else if (number) link.append(` (notebook ${number} in the repository)`);
 }
 
 const send = (command) => worker.postMessage({ command, config, task, number });
@@ -49,7 +49,6 @@ function set(text, anew) {
   element("problems").hidden = !read.problems.length;
   history.replaceState(null, "", `#${toText(config)}`);
   for (const [name, value] of Object.entries(config)) form.elements[name].value = value;
-  for (const button of presets.children) button.ariaPressed = button.value === named();
   const begin = anew || config.seed !== before?.seed;
   if (begin) {
     const generator = new Generator(config.seed);
@@ -58,29 +57,29 @@ function set(text, anew) {
     number++;
   }
   mine.show(config);
-  send(begin ? "reset" : config.blank === before.blank ? "change" : "freeze");
+  send(begin ? "reset" : config.use === before.use ? "change" : "use");
 }
 
-/** Settings of a preset; the seed and the walls stay. */
+/** Settings of a step; the seed and the walls stay. */
 function preset(name) {
   const { seed, seamless, jam } = config;
   return { ...PRESETS[name], seed, seamless, jam };
 }
 
-/** The preset that the settings are, or "own". */
+/** The step of these settings, or "own". */
 function named() {
   const names = Object.keys(PRESETS);
   return names.find((name) => toText(preset(name)) === toText(config)) ?? "own";
 }
 
-/** Do what a step or preset says. */
+/** Do what a step says. */
 function begin(name) {
   step = name;
   if (name === "unload") element("mine").checked = true;
-  else if (name !== "blank") {
+  else if (name !== "height") {
     set(toText(preset(name)), true);
     watch("train");
-  } else if (run?.picks) set(toText({ ...config, blank: true }), false);
+  } else if (run?.picks) set(toText({ ...config, use: "height" }), false);
   render();
 }
 
@@ -97,22 +96,23 @@ function pick(item) {
 
 function verdict() {
   if (step === "unload") return said;
-  if (step !== "blank") return runVerdict(run, config, task);
-  return run.picks ? blankVerdict(run, config, task) : UNTRAINED;
+  if (!run.picks) return step === "height" || step === "use" ? UNTRAINED : "";
+  if (step === "height") return heightVerdict(run, config, task);
+  const told = step === "use" || step === "no_mask" ? useVerdict(run.rates) : "";
+  return told || runVerdict(run, config, task);
 }
 
 function render() {
   if (!run) return; // a report will come
   const { frozen, parameters, picks, points, rates, running } = run;
   network.parameters.set(parameters);
-  if (rates.true) done.add("blank");
+  if (rates.height) done.add("height");
   showSteps();
   showContainer();
   element("train").textContent = running ? "Pause" : "Train";
   element("picks").textContent = `${picks.toLocaleString("en")} picks`;
-  for (const blank of [false, true]) {
-    const rate = rates[blank];
-    element(`rate-${blank}`).textContent = rate ? percent(rate.success_rate) : "";
+  for (const use of Object.values(CHOICES.use[1])) {
+    element(`rate-${use}`).textContent = rates[use] ? percent(rates[use].success_rate) : "";
   }
   showCurve({ success_rate: points, frozen }, Math.max(config.picks, picks));
   showFound(rates);
@@ -126,7 +126,7 @@ function showSteps() {
   const next = nextStep(done);
   for (const { firstChild: button } of steps.children) {
     button.ariaCurrent = button.value === step ? "step" : null;
-    button.disabled = button.value === "blank" && run.running; // of weights that have settled
+    button.disabled = button.value === "height" && run.running; // of weights that have settled
     button.className = done.has(button.value) ? "done" : button.value === next ? "next" : "";
   }
   element("sentence").textContent = SENTENCES[step];
@@ -166,7 +166,7 @@ function showFound(rates) {
 }
 
 async function copyLink() {
-  const link = `${location.href.split("#")[0]}#${toText({ ...config, blank: false })}`;
+  const link = `${location.href.split("#")[0]}#${toText({ ...config, use: "mask" })}`;
   const text = `${headline(run.rates)} ${link}`;
   try {
     await navigator.clipboard.writeText(text);
@@ -178,8 +178,8 @@ async function copyLink() {
 
 function savePicture() {
   const picture = make("canvas", {});
-  const names = ["with x, y and height", "with height only"];
-  const rates = names.map((name, i) => [name, run.rates[i > 0].success_rate]);
+  const { mask, height } = run.rates;
+  const rates = [["with x, y and height", mask], ["with height only", height]];
   const lines = ["Hide x and y", "The same weights, and nothing", "was trained: a preferred side",
     "had outweighed the height."];
   poster(picture, canvas, lines, rates);
@@ -198,14 +198,15 @@ function showPreferences(points) {
   element("dot").setAttribute("transform", `translate(${right} ${down})`);
   element("dot").style.opacity = last ? 1 : 0;
   element("preferences").textContent = last ? `x ${signed(x)}, y ${signed(y)}` : "";
-  const none = "On positions, a rule errs only above 0.67 along y.";
+  const positions = "On positions, a rule errs only above 0.67 along y.";
+  const none = config.sees === "index" ? "No limits are known of the index." : positions;
   element("limits").textContent = above ? `Shaded: nearly all runs err (above ${above}).` : none;
 }
 
 const signed = (value) => value.toFixed(2).replace("-", "\u2212");
 
 function showMaps() {
-  const maps = featureMaps(network, Number(element("axis").value), config.blank, MAP_SIDE);
+  const maps = featureMaps(network, Number(element("axis").value), config.use === "height", MAP_SIDE);
   const largest = Math.max(...maps.flatMap((map) => [...map].map(Math.abs)));
   maps.forEach((map, f) => {
     const [x, y, z] = [...network.extractor.subarray(4 * f, 4 * f + 3)].map(signed);
@@ -220,7 +221,7 @@ function showMaps() {
 /** Give the worker a command, and show what it does to the agent's container. */
 function watch(command) {
   element("agents").checked = true;
-  if (step === "unload" || step === "blank") step = named();
+  if (["unload", "height", "use"].includes(step)) step = named();
   send(command);
 }
 
@@ -236,11 +237,12 @@ element("mine").onchange = element("agents").onchange = render;
 onhashchange = () => set(location.hash.slice(1), true);
 form.onchange = ({ target }) => {
   set(new URLSearchParams(new FormData(form)), false);
-  step = target.name === "blank" ? "blank" : named();
+  if (target.name !== "use") step = named();
+  else step = config.use === "height" ? "height" : "use";
 };
 form.oninput = () => (element("share").textContent = form.elements.jam.value);
 form.onsubmit = (event) => event.preventDefault(); // Enter in a field applies it, no more
-steps.onclick = presets.onclick = ({ target }) => target.value && begin(target.value);
+steps.onclick = ({ target }) => target.value && begin(target.value);
 element("train").onclick = () => watch(run?.running ? "pause" : "train");
 element("step").onclick = () => watch("step");
 element("copy").onclick = copyLink;

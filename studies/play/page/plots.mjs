@@ -81,7 +81,7 @@ export function poster(picture, container, [title, ...lines], rates) {
   pen.drawImage(container, 30, 25, 512, 580);
   write(title, 64, 580, 110);
   lines.forEach((line, i) => write(line, 30, 580, 165 + 44 * i));
-  rates.forEach(([name, rate], i) => {
+  rates.forEach(([name, { success_rate: rate }], i) => {
     const [x, y, colour] = [580, 330 + 140 * i, `rgb(${COLOURS[1 - i]})`];
     write(`${name}: ${Math.round(100 * rate)} %`, 32, x, y, colour);
     pen.globalAlpha = 0.2;

@@ -6,21 +6,22 @@ import { Container, Generator, stackLoad } from "./container.mjs";
 const FRESH = 8; // containers
 const STEP = 1e-3; // along an axis of the observation
 
-/** The scores that a choice compares, (items); with `blank`, x and y count as 0. */
-export function compared(network, observation, { blank }) {
-  const seen = blank ? observation.map((value, i) => (i % 3 === 2 ? value : 0)) : observation;
-  return network.scores(seen);
+/** The scores that a choice compares, (items); used by `height`, x and y count as 0. */
+export function compared(network, observation, { use }) {
+  const height = (value, i) => (i % 3 === 2 ? value : 0);
+  return network.scores(use === "height" ? observation.map(height) : observation);
 }
 
 /** The row of the highest score; with `mask`, of those that have not failed. */
-export function highest(scores, { visible, failed }, { mask }) {
+export function highest(scores, { visible, failed }, mask) {
   const masked = (row) => mask && failed.has(visible[row]);
   const allowed = scores.map((score, row) => (masked(row) ? -Infinity : score));
   return allowed.indexOf(Math.max(...allowed));
 }
 
 /**
- * What the network's own picks do in fresh containers, always the same ones, without learning.
+ * What the network's own picks do in fresh containers, always the same ones, without learning, as
+ * the settings say that it is used.
  *
  * @returns {{success_rate: number, repeated: number}} the share of picks that succeed, and that of
  *   picks which repeat, in the same container, one that has just failed.
@@ -37,7 +38,7 @@ export function judge(network, config, task) {
         seen = container.observation;
         scores = compared(network, seen, config);
       }
-      const item = container.visible[highest(scores, container, config)];
+      const item = container.visible[highest(scores, container, config.use !== "no_mask")];
       if (item === failed) repeated++;
       const success = container.pick(item);
       if (success) successes++;
@@ -70,9 +71,9 @@ export const preferences = ([x, y, z]) => [x / Math.abs(z), y / Math.abs(z)];
 
 /**
  * Sizes of the preferences along x and y above which networks err. There is none (`Infinity`)
- * along x where equal x share one rank, and none is known of positions.
+ * along x where equal x share one rank, and none is known of positions and of the index.
  */
-export function limits({ equalize, ties }, [x, y]) {
-  if (!equalize) return [Infinity, Infinity];
+export function limits({ sees, ties }, [x, y]) {
+  if (sees !== "ranks") return [Infinity, Infinity];
   return [ties === "average" ? Infinity : x, y];
 }

@@ -3,19 +3,20 @@
 
 /** Label of each choice, what it is, and the value of each option; the first is the default. */
 export const CHOICES = {
-  equalize: ["Agent sees", { positions: false, ranks: true },
-    "Positions of the boxes, or, as in the paper, ranks: numbers in the order along each axis"],
-  mask: ["Failed boxes", { masked: true, allowed: false },
-    "Masked: a box that has failed is not chosen again before another one is unloaded"],
+  sees: ["Agent sees", { positions: "positions", ranks: "ranks", "the index": "index" },
+    "Positions of the boxes; ranks, as in the paper’s text: numbers in the order along each axis; or " +
+    "the index that sorting returns, as in its pseudocode"],
+  mask: ["Mask in training", { on: true, off: false },
+    "On: while it learns, a box that has failed is not chosen again before another one is unloaded"],
   replay: ["Replay",
     { "as it is": "as_is", mirrored: "mirrored", "shuffled places": "shuffled" },
     "What is remembered of a pick. Mirrored: x and y get random signs. Shuffled places: the boxes " +
     "exchange their places, left – right and rear – front, at random"],
-  ties: ["Equal coordinates", { "noise decides": "noise", "noise drawn anew": "anew", averaged: "average" },
+  ties: ["Ties", { "by noise": "noise", "by noise, anew": "anew", averaged: "average" },
     "Boxes of equal coordinates are ranked by noise of half a millimetre, drawn once for a load or " +
-    "anew at each pick, or share a rank"],
-  blank: ["Chooses by", { "x, y, z": false, "height only": true },
-    "With height only, x and y count as 0 when the agent chooses; the weights stay as they are"],
+    "anew at each pick; or they share a rank"],
+  // In new containers: with the mask, without it, or with it and by height only, x and y being 0.
+  use: ["In use", { mask: "mask", no_mask: "no_mask", height: "height" }],
   picks: ["Picks",
     { "32,000": 32_000, "64,000": 64_000, "96,000": 96_000, "384,000": 384_000 },
     "Length of a run; random picks end after half of it"],
@@ -33,12 +34,14 @@ export const NUMBERS = {
   seed: [2, 2 ** 32 - 1, /^\d+$/, "a whole number from 0 to 4294967295"],
 };
 
+const RANKS = { sees: "ranks", picks: 96_000 };
 /** What experiments change in the defaults. */
 export const PRESETS = {
   positions: {},
-  stuck: { equalize: true, mask: false, picks: 64_000 },
-  paper: { equalize: true, picks: 96_000 },
-  shuffled: { equalize: true, replay: "shuffled", picks: 96_000 },
+  ranks: RANKS,
+  index: { ...RANKS, sees: "index" },
+  no_mask: { ...RANKS, mask: false },
+  shuffled: { ...RANKS, replay: "shuffled" },
 };
 
 /**

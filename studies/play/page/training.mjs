@@ -2,7 +2,7 @@
 
 import { Container, Generator, stackLoad } from "./container.mjs";
 import { Adam, PEQNetwork } from "./network.mjs";
-import { compared, highest, judge, slopes } from "./policy.mjs";
+import { highest, judge, slopes } from "./policy.mjs";
 
 export const N_FEATURES = 16;
 const REPLAY_SIZE = 2 ** 15; // picks
@@ -56,8 +56,8 @@ export class Training {
       const { observation, visible } = container;
       const explore = choices.uniform() < epsilon;
       const draws = () => visible.map(() => choices.uniform());
-      const scores = explore ? draws() : compared(network, observation, config);
-      const action = highest(scores, container, config);
+      const scores = explore ? draws() : network.scores(observation);
+      const action = highest(scores, container, config.mask);
       return { observation, action, reward: container.pick(visible[action]) ? 1 : -1 };
     });
     if (memory.length >= config.batch_size) {

@@ -4,6 +4,7 @@
 import { limits, preferences } from "./policy.mjs";
 
 const ROSE = 0.8; // rate of an agent that has learned, although it errs
+const PART = 0.5; // rate of one that has learned in part, about twice that of random picks
 const HIGH = 0.95; // rates that a fall begins at, and ends at
 const LOW = 0.8;
 const WORSE = 0.2; // by how much a rate has sunk that was never so high
@@ -11,8 +12,8 @@ const STUCK = 0.5; // share of picks that repeat one that has just failed
 const MISLED = 0.1; // by how much a rate rises if x and y are blank
 const SIDES = [["the rear", "the front"], ["the left side", "the right side"]];
 
-/** Names of the five steps in their order; those of `PRESETS` train with these settings. */
-export const STEPS = ["unload", "positions", "paper", "blank", "shuffled"];
+/** Names of the steps in their order; those of `PRESETS` train with these settings. */
+export const STEPS = ["unload", "positions", "ranks", "height", "index", "no_mask", "shuffled"];
 
 export const SENTENCES = {
   unload:
@@ -21,16 +22,22 @@ export const SENTENCES = {
   positions:
     "In 64 containers an agent, which sees the boxes’ positions, " +
     "learns from its own picks which box to take.",
-  paper:
-    "Now it sees, as in the paper, only ranks: " +
-    "each box’s number in the order along x, y and z.",
-  blank:
+  ranks:
+    "Now it sees only ranks: each box’s number along x, y and z. " +
+    "The mask is on, also while it learns: it may not repeat what has just failed.",
+  height:
     "Nothing is trained: the same weights see height alone, in the container shown and in eight " +
     "new ones, where their picks are counted.",
+  index:
+    "The paper’s pseudocode prints the index that sorting returns " +
+    "(argsort; a rank is argsort twice): row i sees which row comes i-th.",
+  no_mask:
+    "Ranks again, but the mask is on in use only: " +
+    "the paper needs it “primarily … during the application phase”.",
   shuffled:
-    "It learns anew, with shuffled places: in each remembered pick the boxes exchange theirs, " +
-    "so that no place can be learned.",
-  stuck: "Without the mask, a box that has just failed may be chosen again, and again.",
+    "It learns anew from ranks, with shuffled places: in each remembered pick the boxes exchange " +
+    "theirs, so that no place can be learned.",
+  use: "Nothing is trained: the same weights, with the mask and without it, in eight new containers.",
   own: "Your own settings: Train goes on with them, Reset brings back the first weights.",
 };
 
@@ -59,15 +66,18 @@ export function pickVerdict(container, item, success) {
  * What a run did, by what its weights do in fresh containers where nothing is drawn at random.
  *
  * @param {object} run its `points` and judgements `frozen`, see training.mjs, `picks`, and
- *   `seconds` of training; whether it is `running`.
+ *   `seconds` of training; `rates` of its weights by their use; whether it is `running`.
  * @param {object} config its settings.
- * @param {object} task its numbers `thresholds` and `errs`.
+ * @param {object} task its numbers `thresholds`, `errs` and `paper_msr`.
  */
-export function runVerdict({ points, frozen, picks, seconds, running }, config, task) {
+export function runVerdict(run, config, task) {
+  const { points, frozen, picks, seconds, running } = run;
   if (!points.length) return "";
-  const [latest, judged] = [points.at(-1), frozen.at(-1)];
+  const latest = points.at(-1);
+  const judged = run.rates[config.use] ?? frozen.at(-1); // by the use that is set now, if it can
+  const [top, end] = [ceiling(config), judged?.success_rate];
   const rates = frozen.map((each) => each.success_rate);
-  const [top, best, end] = [ceiling(config), Math.max(...rates), rates.at(-1)];
+  const best = Math.max(...rates, end);
   if (running || picks < config.picks || !judged) {
     const fresh = judged ? `; with its weights frozen, ${percent(end)}` : "";
     return `${percent(latest.success_rate)} of its latest picks succeeded${fresh}.`;
@@ -80,41 +90,52 @@ export function runVerdict({ points, frozen, picks, seconds, running }, config, 
   if (judged.repeated > STUCK) {
     return `It is stuck: ${percent(judged.repeated)} of its picks repeat one that has just failed.`;
   }
-  const why = misled(latest.slopes, config, task);
+  const why = remark(latest.slopes, config, task);
   const high = rates.findIndex((rate) => rate >= HIGH * top);
   const fell = high >= 0 && rates.slice(high).some((rate) => rate <= LOW * top);
   if (!fell && best - end < WORSE * top) {
-    const what = end >= ROSE * top ? "It did not fall" : "It did not learn";
-    return `${what}: ${percent(end)} at the end, ${percent(best)} at best; it ${why}.${limit}`;
+    const part = end >= PART * top ? "It learned in part" : "It did not learn";
+    const what = end >= ROSE * top ? "It did not fall" : part;
+    return `${what}: ${percent(end)} at the end, ${percent(best)} at best; ${why}.${limit}`;
   }
   const early = frozen[rates.indexOf(best)].picks.toLocaleString("en");
   const what = `It ${fell ? "fell" : "got worse"}: best after ${early} picks`;
   const both = `with ${percent(best)} in new containers; ${percent(end)} at the end`;
-  return `${what}, ${both}. It ${why}.${limit}`;
+  return `${what}, ${both}; ${why}.${limit}`;
 }
 
-/** What a network prefers to height, by its slopes. */
-function misled(slopes, config, task) {
-  if (slopes[2] <= 0) return "prefers low boxes";
+/** What a network prefers to height, by its slopes; beside one of the index, the paper's. */
+function remark(slopes, config, task) {
+  if (config.sees === "index") return `the paper’s agent ends at ${percent(task.paper_msr)}`;
+  if (slopes[2] <= 0) return "it prefers low boxes";
   const along = preferences(slopes);
   const known = limits(config, task.thresholds);
   const beyond = known.map((limit, axis) => Math.abs(along[axis]) / limit);
   const axis = beyond[1] > beyond[0] ? 1 : 0;
-  if (beyond[axis] <= 1) return "prefers no place to height";
-  return `prefers ${SIDES[axis][along[axis] > 0 ? 1 : 0]} to height`;
+  if (beyond[axis] <= 1) return "it prefers no place to height";
+  return `it prefers ${SIDES[axis][along[axis] > 0 ? 1 : 0]} to height`;
 }
 
 /** What is shared of rates with x and y and without; empty if hiding them does not help. */
 export function headline(rates) {
-  const [seen, blank] = [rates.false, rates.true].map((rate) => rate?.success_rate);
+  const [seen, blank] = [rates.mask, rates.height].map((rate) => rate?.success_rate);
   if (!(blank - seen >= MISLED)) return "";
   const change = `from ${Math.round(100 * seen)} to ${percent(blank)}`;
   return `Hide x and y: the same weights go ${change}, and nothing was trained.`;
 }
 
+/** What frozen weights do in fresh containers with the mask and without it; empty if not known. */
+export function useVerdict({ mask, no_mask }) {
+  if (!mask || !no_mask) return "";
+  const rates = [mask, no_mask].map(({ success_rate }) => percent(success_rate));
+  const both = `With the mask these weights succeed in ${rates[0]} of picks, without it in ${rates[1]}`;
+  const again = `there they are stuck: ${percent(no_mask.repeated)} repeat a pick that has just failed`;
+  return no_mask.repeated > STUCK ? `${both}; ${again}.` : `${both}.`;
+}
+
 /** What frozen weights do in fresh containers, with x and y and without. */
-export function blankVerdict({ rates }, config, task) {
-  const [seen, blank] = [rates.false, rates.true].map((rate) => rate?.success_rate);
+export function heightVerdict({ rates }, config, task) {
+  const [seen, blank] = [rates.mask, rates.height].map((rate) => rate?.success_rate);
   if (blank === undefined) return "";
   const without = `With height alone these weights succeed in ${percent(blank)} of picks`;
   if (seen === undefined) return `${without}.`;

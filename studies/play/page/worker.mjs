@@ -1,41 +1,43 @@
 // The training in a thread of its own, so that the page stays smooth.
 
 const FRAME = 30; // ms of training between two messages to the page
-const REST = 60; // ms without a command, after which frozen weights are judged
+const REST = 60; // ms without a command, after which the weights are judged
 let training, timer, goal = 0; // the run, what continues it, and after how many picks it pauses
 let number; // of the run, as the page counts
-let seconds = 0, rates = {}; // of training; of fresh picks, by whether x and y are blank
+let seconds = 0, rates = {}; // of training; what the weights do in new containers, by their use
 
 onmessage = ({ data: { command, config, task, ...run } }) => {
   clearTimeout(timer);
   number = run.number;
   if (command === "reset") [training, seconds] = [new Training(config, task), 0];
   else training.change(config);
-  const frozen = command === "freeze";
-  if (!frozen) rates = {}; // only a freeze leaves the weights, and all but what is blank
+  if (command !== "use") rates = {}; // only that leaves the weights, and what they see
   if (command === "train") goal = (Math.floor(training.picks / config.picks) + 1) * config.picks;
   else if (command !== "change") goal = 0;
   if (command === "step") training.step(), training.addPoint();
-  work(frozen ? [config.blank, !config.blank] : [config.blank]);
+  work();
 };
 
-/** Train until the goal; then judge the weights, whose picks are compared in these ways. */
-function work(ways) {
+/** Train until the goal; then judge the weights. */
+function work() {
   const start = performance.now();
   while (training.picks < goal && performance.now() < start + FRAME) training.step();
   seconds += (performance.now() - start) / 1000;
   report();
   // In between, commands are read.
-  if (training.picks < goal) timer = setTimeout(work, 0, ways);
-  else if (training.picks) timer = setTimeout(judgeWeights, REST, ways);
+  if (training.picks < goal) timer = setTimeout(work);
+  else if (training.picks) timer = setTimeout(judgeWeights, REST);
 }
 
-/** Judge the weights with x and y blank or not: first as they choose now. */
-function judgeWeights([blank, ...others]) {
+/** Judge the weights as they are used, one way after another; by height only if it is chosen. */
+function judgeWeights() {
   const { config, network, task } = training;
-  rates[blank] ??= judge(network, { ...config, blank }, task);
+  const uses = new Set([config.use, "mask", "no_mask"]);
+  const [use] = [...uses].filter((each) => !rates[each]);
+  if (!use) return;
+  rates[use] = judge(network, { ...config, use }, task);
   report();
-  if (others.length) timer = setTimeout(judgeWeights, 0, others);
+  timer = setTimeout(judgeWeights);
 }
 
 function report() {

@@ -12,6 +12,7 @@ import pytest
 import torch
 
 from studies import paths
+from studies.order.index import sorted_index
 from studies.play import page
 from unload import task
 from unload.agent.learner import PlainLearner
@@ -22,7 +23,7 @@ from unload.network.peq import PEQNetwork
 from unload.physics.situation import Surroundings
 from unload.physics.table import TablePhysics, shared_table
 
-MOST_BYTES = 60_000
+MOST_BYTES = 62_000
 NODE = shutil.which("node")
 needs_node = pytest.mark.skipif(NODE is None, reason="Node is not installed")
 # All that the modules of the page export, ``given`` and ``result``.
@@ -126,10 +127,13 @@ def test_updates_and_scores_are_those_of_the_learner(rng):
 
 
 @needs_node
-@pytest.mark.parametrize("seen", [(False, "noise"), (True, "noise"), (True, "average")])
+@pytest.mark.parametrize(
+    "seen", [("positions", "noise"), ("ranks", "noise"), ("ranks", "average"), ("index", "noise")]
+)
 def test_observations_are_those_of_the_environment(seen, rng):
     """Also when boxes have been unloaded, and to the last one."""
-    equalize, ties = seen
+    sees, ties = seen
+    equalize = sees == "ranks"
     variants = rng.integers(3, size=(12, 3, 4))
     env = ContainerEnv("table", equalize=equalize, ties=ties, max_picks=10**6)
     load = build_load(variants)
@@ -153,7 +157,7 @@ def test_observations_are_those_of_the_environment(seen, rng):
         """,
         variants=variants.ravel().tolist(),
         noise=noise.tolist(),
-        equalize=equalize,
+        sees=sees,
         ties=ties,
     )
     assert len(got["picks"]) == len(noise) - 1
@@ -161,7 +165,10 @@ def test_observations_are_those_of_the_environment(seen, rng):
         count = len(pick["visible"])
         assert pick["visible"] == env.visible[:count].tolist()
         there = np.array(pick["seen"], np.float32).reshape(-1, 3)
-        assert np.abs(there - observation[:count]).max() < 1e-6
+        expected = observation[:count]
+        if sees == "index":
+            expected = sorted_index(expected)
+        assert np.abs(there - expected).max() < 1e-6
         observation, reward, *_ = env.step(pick["visible"].index(pick["item"]))
         assert reward == 1
 
@@ -173,7 +180,7 @@ def test_noise_drawn_anew_exchanges_equal_boxes_alone():
         """
         const generator = new Generator(0);
         const container = new Container(stackLoad(generator, given.task), given.task, generator);
-        container.show({ equalize: true, ties: "anew", seamless: false });
+        container.show({ sees: "ranks", ties: "anew", seamless: false });
         result.exact = container.visible.map((item) => container.exact[item]);
         const fails = (item) => !container.liftable(item);
         result.seen = [0, 1, 2].map(() => {
@@ -204,7 +211,7 @@ def test_lifts_agree_with_the_table_of_lifts_but_for_boxes_that_tip_aside():
         result.loads = [...Array(10).keys()].map((seed) => {
           const variants = Array.from({ length: 144 }, () => choices.integer(3));
           const container = new Container(buildLoad(variants, task), task, new Generator(seed));
-          container.show({ equalize: false, ties: "noise", seamless: false });
+          container.show({ sees: "positions", ties: "noise", seamless: false });
           const picks = Array.from({ length: 200 }, () => {
             const item = container.visible[choices.integer(128)];
             return [item, container.pick(item)];
@@ -227,38 +234,41 @@ def test_lifts_agree_with_the_table_of_lifts_but_for_boxes_that_tip_aside():
     assert tipped <= 20, "the page says 0.4 % of whole episodes"
 
 
-# What a preset's name says of its frozen weights at the end, and at their best.
+# What a step shows of its weights at the end with the mask and without it, and of the best before.
 ENDS = {
-    "positions": lambda end, best: end >= 0.999,
-    "stuck": lambda end, best: end <= 0.3 and best <= 0.3,
-    "paper": lambda end, best: end <= 0.6 and best >= 0.75,
-    "shuffled": lambda end, best: end >= 0.9,
+    "positions": lambda mask, no_mask, best: mask >= 0.999,
+    "ranks": lambda mask, no_mask, best: mask <= 0.5 and best >= 0.75,
+    "index": lambda mask, no_mask, best: 0.55 <= mask <= 0.65 and no_mask <= 0.05,
+    "no_mask": lambda mask, no_mask, best: mask >= 0.5 and no_mask <= 0.3,
+    "shuffled": lambda mask, no_mask, best: mask >= 0.9,
 }
 
 
 @pytest.mark.slow
 @needs_node
-@pytest.mark.parametrize("preset", ENDS)
-def test_presets_end_where_they_say(preset):
+@pytest.mark.parametrize("step", ENDS)
+def test_steps_end_where_they_say(step):
     """With the seed that the page begins with."""
     got = run_js(
         """
-        const { config } = fromText(toText(PRESETS[given.preset]));
+        const { config } = fromText(toText(PRESETS[given.step]));
         const run = new Training(config, given.task);
         while (run.picks < config.picks) run.step();
-        result.rates = run.frozen.map((judged) => judged.success_rate);
+        result.frozen = run.frozen.map((judged) => judged.success_rate);
+        const { success_rate } = judge(run.network, { ...config, use: "no_mask" }, given.task);
+        result.no_mask = success_rate;
         """,
-        preset=preset,
+        step=step,
     )
-    end, best = got["rates"][-1], max(got["rates"])
-    assert ENDS[preset](end, best), f"{end:.3f} at the end, {best:.3f} at best"
+    ends = {"mask": got["frozen"][-1], "no_mask": got["no_mask"], "best": max(got["frozen"])}
+    assert ENDS[step](**ends), ends
 
 
 @needs_node
 def test_slopes_are_those_of_derivatives():
     got = run_js(
         """
-        const { config } = fromText("equalize=true");
+        const { config } = fromText("sees=ranks");
         const run = new Training(config, { ...given.task, num_envs: 8 });
         for (let step = 0; step < 100; step++) run.step();
         const { network, containers } = run;
@@ -282,7 +292,7 @@ def test_the_replay_changes_places_only():
         """
         const task = { ...given.task, num_envs: 5 };
         result.runs = ["as_is", "shuffled", "mirrored"].map((replay) => {
-          const run = new Training(fromText(`equalize=true&replay=${replay}`).config, task);
+          const run = new Training(fromText(`sees=ranks&replay=${replay}`).config, task);
           run.step();
           return run.memory.map((pick) => [...pick.observation]);
         });
