@@ -1,6 +1,7 @@
 """The checks of the exercises: which answers they take, and what they say of others."""
 
 import importlib
+import inspect
 import re
 from unittest.mock import patch
 
@@ -11,7 +12,7 @@ import torch
 
 from notebooks import checks
 from notebooks.checks import Exercise, check, judged
-from notebooks.checks.solutions import solution, stand_in
+from notebooks.checks.solutions import NAMES, solution, stand_in
 from tests.test_notebooks import CHAPTERS, cells
 from unload import plain
 
@@ -107,43 +108,92 @@ def test_an_empty_loop_is_said_to_be_empty_where_it_is_used():
 
 
 def test_runs_that_differ_are_compared_in_a_sentence():
-    weights, losses = {"weight": torch.zeros(2)}, np.arange(3.0)
+    losses, means, weights = package = np.arange(3.0), np.zeros(4), {"weight": torch.zeros(2)}
     for changed, line in (
-        ((losses, weights), "3 losses and all weights are the same, bit by bit"),
-        ((losses[:2], weights), "there are 2 losses; expected 3"),
-        ((losses + [0, 1, 0], weights), "the losses differ from update 2 on"),
-        ((losses, {"weight": torch.ones(2)}), "the losses agree, the weights at the end do not"),
+        (package, "3 losses and all weights are the same, bit by bit"),
+        ((losses[:2], means, weights), "the losses have the shape (2,); expected (3,)"),
+        ((losses + [0, 1, 0], means, weights), "the losses differ from update 2 on"),
+        (
+            (losses, means, {"weight": torch.ones(2)}),
+            "the losses agree, the weights at the end do not",
+        ),
+        ((losses, means[1:], weights), "the mean rewards have the shape (3,); expected (4,)"),
+        ((losses, means + [0, 0, 1, 0], weights), "the mean reward of step 3 is 1; expected 0"),
     ):
-        assert by_checks.compare(*changed, losses, weights) == line
+        assert by_checks.compare(changed, package) == line
 
 
-def test_mistakes_in_the_algorithm_are_noticed():
-    """Each differs from the page in one thing; some show in an emptied container alone.
+MASKED = "np.where(allowed, scores, -np.inf)"
+BEST = "target(after).masked_fill(~free, -torch.inf).amax(dim=1)"
+ENDED = "best.masked_fill(ended, 0)"
+MEAN = "np.mean([reward for _, _, reward, *_ in picks])"
+MISTAKES = [  # in ``plain``: what is replaced, by what, and what is said
+    ("choose", MASKED, "scores", "ε = 0.0 it chooses an item that the mask excludes"),
+    ("choose", MASKED, "np.where(allowed, scores, 0)", "ε = 0.0 it chooses an item that the mask"),
+    ("choose", MASKED, "np.where(allowed, scores, -1)", "ε = 0.0 it chooses an item that the mask"),
+    ("choose", "allowed, scores", "allowed | explore[:, None], scores", "ε = 0.5 it chooses an"),
+    ("choose", "< epsilon", "> epsilon", "with ε = 0.0 59 of 64 actions differ from the package"),
+    ("choose", "axis=1", "axis=0", "it returns actions of shape (128,); expected (64,)"),
+    (
+        "choose", "rng.random(scores[explore].shape)", "rng.random(scores.shape)[explore]",
+        "the count of random numbers drawn is not; expected one an environment",
+    ),
+    ("update", BEST, "target(after).amax(dim=1)", "expected 0.5056613: the mask is forgotten"),
+    ("update", "~free", "free", "the mask is inverted"),
+    ("update", BEST, "(target(after) * free).amax(dim=1)", "what the mask excludes has the score"),
+    ("update", "target(after)", "network(after)", "is that of the network; expected the target"),
+    ("update", "target(after)", "target(before)", "the maximum is that of the state before"),
+    ("update", ENDED, "best", "γ = 0.0 is nan: where the episode has ended, nothing is free and"),
+    ("update", f"{BEST}\n    goal = reward + gamma * {ENDED}",
+     "target(after).amax(dim=1)\n    goal = reward + gamma * best", "mask and end of the episode"),
+    ("update", "-torch.inf).amax(dim=1)\n    goal = reward + gamma * " + ENDED,
+     "-1e9).amax(dim=1)\n    goal = reward + gamma * best", "is 8.59e+07: where the episode"),
+    ("update", "smooth_l1_loss", "torch.nn.functional.mse_loss", "the loss is the squared error"),
+    ("update", "values, goal", "values, goal, reduction='sum'", "a sum; expected a mean"),
+    ("update", "gamma * ", "", "γ is missing"),
+    ("update", "gather(1", "gather(0", "expected 0.5167001; the goal is the reward here"),
+    ("update", ".amax(dim=1)", ".logsumexp(dim=1)", "; with γ = 0 it is right"),
+    ("update", "with torch.no_grad()", "if True", "it computes gradients of the target network"),
+    ("update", "loss.item()", "loss", "it returns a Tensor; expected the loss as a float"),
+    ("update", "optimizer.step()", "optimizer.step(), optimizer.step()", "weights afterwards are"),
+    ("update", "optimizer.zero_grad()", "", "update 2 with γ = 0.0 is right, the weights after"),
+    ("update", "optimizer.step()", "", "the weights do not change: zero_grad, backward, step"),
+    ("masked_dqn", "(step + 1)", "step", "update 150 on; look at γ and the target network"),
+    ("masked_dqn", "1 - step", "1 - (step + 1)", "positions: the losses differ from update 1 on"),
+    ("masked_dqn", "size=batch_size", "size=64", "a short memory: the losses differ from update 1"),
+    ("masked_dqn", ") % size", ")", "a short memory: the losses differ from update 7 on; look at"),
+    ("masked_dqn", "epsilon, mask", "epsilon, True", "positions: the losses differ from"),
+    ("masked_dqn", MEAN, "0.0", "the mean reward of step 1 is 0; expected -0.5"),
+    ("masked_dqn", MEAN, "picks[0][2]", "the mean reward of step 1 is 1; expected -0.5"),
+    ("masked_dqn", MEAN, "[each[2] for each in picks]", "have the shape (20, 64); expected (20,)"),
+    ("masked_dqn", ", np.array(means)", "", "it returns ndarray; expected losses and mean rewards"),
+]  # fmt: skip
+SAME = [
+    ("choose", "-np.inf", "-2.0"),
+    ("choose", ".argmax(axis=1)", ".argmax(axis=1).tolist()"),
+    ("update", f"reward + gamma * {ENDED}", "torch.where(ended, reward, reward + gamma * best)"),
+    ("update", "amax(dim=1)", "max(dim=1).values"),
+    ("masked_dqn", "np.array(losses), np.array(means)", "losses, means"),
+]
+NUMBERS = {function: name for name, function in NAMES.items()}
 
-    Others show in the losses' type, or where the replay memory is full.
-    """
-    torch.set_num_threads(1)
 
-    def ignores_the_mask(network, observations, allowed, epsilon, rng):
-        return plain.choose(network, observations, np.ones_like(allowed), epsilon, rng)
+def said_of(function, old, new):
+    """What the check says of a function of ``plain`` that is written otherwise in one place."""
+    source, namespace = inspect.getsource(getattr(plain, function)), dict(vars(plain))
+    assert source.count(old) == 1
+    exec(source.replace(old, new), namespace)
+    return judged(checks.exercise(NUMBERS[function]), namespace[function])
 
-    def forgets_the_end(network, target, optimizer, picks, gamma):
-        picks = [(*pick[:5], np.False_) for pick in picks]
-        return plain.update(network, target, optimizer, picks, gamma)
 
-    def returns_a_tensor(*given):
-        return torch.tensor(plain.update(*given))
+@pytest.mark.parametrize(("function", "old", "new", "said"), MISTAKES)
+def test_mistakes_in_the_algorithm_are_noticed_and_named(function, old, new, said):
+    assert said in said_of(function, old, new)
 
-    def remembers_all(*given, size, **options):
-        return plain.masked_dqn(*given, **options)
 
-    for number, wrong, line in (
-        ("1", ignores_the_mask, "an item that the mask excludes"),
-        ("2", forgets_the_end, "of update 1 with γ = 0.0 is nan where the episode has ended"),
-        ("2", returns_a_tensor, "it returns a Tensor; expected the loss as a float"),
-        ("3", remembers_all, f"positions, size = {by_checks.SMALL}: the losses differ from update"),
-    ):
-        assert line in judged(checks.exercise(f"04/{number}"), wrong)
+@pytest.mark.parametrize(("function", "old", "new"), SAME)
+def test_the_algorithm_may_be_written_otherwise(function, old, new):
+    assert said_of(function, old, new) == "right"
 
 
 def test_a_plan_runs_and_an_answer_are_judged_by_their_form():
@@ -181,6 +231,7 @@ def test_a_plan_runs_and_an_answer_are_judged_by_their_form():
         ("30/3", {"low": 0.55}, "of 'a' the value 0.5 is not within 0.55 to 0.6"),
         ("30/3", {"low": 0.5, "high": 0.5}, "has no width"),
         ("30/3", {"runs": 3}, "'a' has 3 runs; expected 10 or more"),
+        ("30/3", {"setting": ["a", "a"]}, "'a' has two rows; expected one a setting"),
         ("30/3", {"verdict": "yes"}, "is 'yes'; expected one of 'holds', 'refuted', 'open'"),
     ):
         assert said in judged(checks.exercise(name), pd.DataFrame(good[name] | changed))
@@ -190,9 +241,31 @@ def test_a_plan_runs_and_an_answer_are_judged_by_their_form():
     assert "one setting; expected a control" in judged(checks.exercise("30/2"), alone)
 
 
+def test_what_has_been_solved_is_listed(own_data, capsys):
+    """A wrong answer later changes nothing, and the solutions' own answers do not count."""
+    check()
+    assert "\n03  – – –\n04  – – – –\n" in capsys.readouterr().out
+    for name, answer in (("03/2", 0.9), ("03/2", 1), ("10/1", (2, 0.5)), ("10/1", (2, 0.5))):
+        check(name, answer)
+    check("04/4", 2 / 3, strict=True)
+    capsys.readouterr()
+    check()
+    lines = capsys.readouterr().out.splitlines()
+    assert [line for line in lines if re.search(r"  .*\d", line)] == ["03  – 2 –", "10  1 –"]
+    assert len(lines) == len(CHAPTERS)
+
+
 def test_a_solution_is_shown_to_whoever_asks_and_stands_in_unseen(capsys):
-    assert stand_in("04/2") is plain.update
-    assert capsys.readouterr().out == "from here on: the solution's `update`\n"
+    def update(network, target, optimizer, picks, gamma): ...
+
+    def choose(network, observations, allowed, epsilon, rng):
+        return 7
+
+    for mine in (None, update):
+        assert stand_in("04/2", mine) is plain.update
+        assert capsys.readouterr().out == "from here on: the solution's `update`\n"
+    assert stand_in("04/1", choose) is choose
+    assert capsys.readouterr().out == "from here on: your `choose`\n"
     with patch("notebooks.checks.solutions.display") as display:
         assert solution("04/2") is None
     assert "def update(network, target" in display.call_args.args[0].data

@@ -1,7 +1,7 @@
 """The checks of the exercises, one file a track, called by name: ``check("06/1", answer)``.
 
 Its ``EXERCISES`` say of each exercise which kind of answer is wanted, when it is right, and what to
-look at again; the solutions pass the same.
+look at again; the solutions pass the same. ``check()`` lists what has been solved in all notebooks.
 """
 
 import importlib
@@ -12,8 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from studies import paths
+
 # By the first digit of a notebook.
 TRACKS = {"0": "core", "1": "reproduction", "2": "beyond", "3": "capstone"}
+MISSING = "not yet"  # said of an answer that is still to be given
+SOLVED = "solved.txt"  # in ``runs/``: a name a line
 REDUCED = "UNLOAD_REDUCED"  # set where a notebook runs at reduced counts
 
 
@@ -36,10 +40,11 @@ class Missing(Exception):
     """A function that is to be written has an empty body still; it says which."""
 
 
-def check(name: str, answer: object, *, strict: bool = False) -> None:
+def check(name: str | None = None, answer: object = None, *, strict: bool = False) -> None:
     """Print in one line whether the answer to an exercise is right, wrong or still missing.
 
     A wrong answer does not stop a notebook, nor does one of a wrong kind, or a function that fails.
+    Without a name, print which exercises have been solved.
 
     Args:
         name: number of the notebook and of the exercise, such as ``"06/1"``.
@@ -50,10 +55,37 @@ def check(name: str, answer: object, *, strict: bool = False) -> None:
     Raises:
         ValueError: there is no such exercise.
     """
+    if name is None:
+        print(solved())
+        return
     said = judged(exercise(name), answer)
+    if said == "right" and not strict:
+        _note(name)
     if strict and said != "right" and REDUCED not in os.environ:
         raise AssertionError(f"{name}: {said}")
     print(f"{name}: {said}")
+
+
+def solved() -> str:
+    """The numbers of the solved exercises, a line for each notebook; a dash stands for others."""
+    noted = _noted()
+    lines: dict[str, list[str]] = {}
+    for track in TRACKS.values():
+        for name in importlib.import_module(f"{__name__}.{track}").EXERCISES:
+            notebook, number = name.split("/")
+            lines.setdefault(notebook, []).append(number if name in noted else "–")
+    return "\n".join(f"{notebook}  {' '.join(numbers)}" for notebook, numbers in lines.items())
+
+
+def _noted() -> set[str]:
+    """The names of the exercises that a reader has solved in this checkout."""
+    file = paths.RUNS / SOLVED
+    return set(file.read_text(encoding="utf-8").split()) if file.exists() else set()
+
+
+def _note(name: str) -> None:
+    paths.RUNS.mkdir(exist_ok=True)
+    (paths.RUNS / SOLVED).write_text("\n".join(sorted(_noted() | {name})), encoding="utf-8")
 
 
 def exercise(name: str) -> Exercise:
@@ -68,7 +100,7 @@ def exercise(name: str) -> Exercise:
 def judged(wanted: Exercise, answer: object) -> str:
     """What is said of an answer: ``"right"``, or a sentence that begins with ``"not yet"``."""
     if answer is None:
-        return "not yet"
+        return MISSING
     try:
         given = wanted.kind(answer)
     except (TypeError, ValueError):
@@ -76,7 +108,7 @@ def judged(wanted: Exercise, answer: object) -> str:
     try:
         right = wanted.right(given)
     except Missing:
-        return "not yet"
+        return MISSING
     except Unusable as error:
         return f"not yet: {error}"
     except Exception as error:

@@ -72,6 +72,9 @@ def answers(rows):
     lack = missing(rows, "setting", "runs", "value", "low", "high", "verdict")
     if lack:
         return lack
+    if rows["setting"].duplicated().any():
+        twice = rows.loc[rows["setting"].duplicated(), "setting"].iloc[0]
+        return f"{twice!r} has two rows; expected one a setting"
     for row in rows.to_dict("records"):
         if not row["low"] <= row["value"] <= row["high"]:
             interval = f"{row['low']:.3g} to {row['high']:.3g}"

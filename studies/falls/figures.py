@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from studies.falls.cells import PREFERENCES, PUPILS
-from studies.falls.laboratory import ERRS, THRESHOLDS
+from studies.falls.laboratory import ERRS, THRESHOLDS, preferences
 from studies.paper.training import PAPER_CELLS
 from studies.statistics import PAPER_MSR
 from studies.style import COLOURS, WITHOUT_MASK, styled
@@ -164,14 +164,16 @@ def ends(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
 
 
 @styled
-def phase(networks: Mapping[str, pd.DataFrame]) -> Figure:
+def phase(networks: Mapping[str, pd.DataFrame], rules: Mapping[str, np.ndarray]) -> Figure:
     """Networks by their preferences along x and y, coloured by whether they err.
 
-    The shaded region is where the rule of ``laboratory.predicted`` says that a network errs.
+    The shaded region is where ``laboratory.predicted`` says that a network errs. Within the black
+    line no rule ``measures.preferring`` does.
 
     Args:
         networks: by how ties are broken, a title; each with ``slope_x``, ``slope_y``, ``slope_z``
             and ``judged_as_is``. Equal x share a rank in the last of them.
+        rules: by the same titles, see ``dug``.
     """
     figure, panels = plt.subplots(1, len(networks), figsize=(8.4, 4), sharex=True, sharey=True)
     edge = 0.98 * MOST_PREFERENCE
@@ -182,12 +184,12 @@ def phase(networks: Mapping[str, pd.DataFrame]) -> Figure:
         axes.set_facecolor(SHADE)
         corner, size = (-along_x, -along_y), (2 * along_x, 2 * along_y)
         axes.add_patch(plt.Rectangle(corner, *size, color="white", zorder=0))
-        preferences = rows[["slope_x", "slope_y"]].div(rows["slope_z"].abs(), axis=0)
-        preferences = preferences.clip(-edge, edge)
-        errs = rows["judged_as_is"] < ERRS
+        line = np.linspace(-MOST_PREFERENCE, MOST_PREFERENCE, len(rules[title]))
+        axes.contour(line, line, rules[title], [ERRS], colors="black", linewidths=1)
+        along, errs = preferences(rows).clip(-edge, edge), rows["judged_as_is"] < ERRS
         for name, chosen, colour in (("errs", errs, "C1"), ("does not", ~errs, "C0")):
             axes.plot(
-                preferences["slope_x"][chosen], preferences["slope_y"][chosen], "o",
+                along["x"][chosen], along["y"][chosen], "o",
                 color=colour, ms=5, alpha=0.8, mew=0, label=f"{name}: {chosen.sum()}",
             )  # fmt: skip
         limits = -MOST_PREFERENCE, MOST_PREFERENCE

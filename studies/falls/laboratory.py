@@ -167,6 +167,12 @@ def publish_cells(
     publish(name, tables, f"{COMMAND} {part}", settings, results, fingerprint, "%.4g")
 
 
+def preferences(table: pd.DataFrame) -> pd.DataFrame:
+    """The preferences of networks along ``x`` and ``y``, by their ``SLOPES``."""
+    along = table[["slope_x", "slope_y"]].div(table["slope_z"].abs(), axis=0)
+    return along.set_axis(["x", "y"], axis=1)
+
+
 def predicted(table: pd.DataFrame, config: TrainConfig = CONFIG) -> pd.Series:
     """Whether each network errs, by its preferences alone.
 
@@ -176,7 +182,6 @@ def predicted(table: pd.DataFrame, config: TrainConfig = CONFIG) -> pd.Series:
         table: with ``SLOPES``.
         config: of the runs.
     """
-    along = table[["slope_x", "slope_y"]].abs().div(table["slope_z"].abs(), axis=0)
-    along_x, along_y = THRESHOLDS
-    side = along["slope_y"] > along_y
-    return side if config.ties == "average" else side | (along["slope_x"] > along_x)
+    along, (along_x, along_y) = preferences(table).abs(), THRESHOLDS
+    side = along["y"] > along_y
+    return side if config.ties == "average" else side | (along["x"] > along_x)

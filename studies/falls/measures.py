@@ -110,18 +110,17 @@ def preferring(along_x: float, along_y: float, ties: str = "noise") -> Policy:
     return policy
 
 
-def rules(ties: str, preferences: np.ndarray, containers: int = 4) -> np.ndarray:
+def rules(ties: str, along_x: np.ndarray, along_y: np.ndarray, containers: int = 4) -> np.ndarray:
     """MSR of the rules ``preferring``, with the mask, in containers of their own.
 
     Args:
         ties: see ``unload.equalize``.
-        preferences: (k,), taken along y, the rows, and along x, the columns.
+        along_x, along_y: the preferences, two arrays of the same shape.
         containers: for each rule.
 
     Returns:
-        (k, k) float64 in [0, 1].
+        float64 in [0, 1], of that shape.
     """
-    along_y, along_x = np.meshgrid(preferences, preferences, indexing="ij")
     weights = np.stack([along_x, along_y, np.ones_like(along_x)], -1, dtype=np.float32)
     weights = weights.reshape(-1, 1, 3).repeat(containers, axis=0)
     envs = gymnasium.make_vec("unload/Container-v0", len(weights), equalize=True, ties=ties)

@@ -77,7 +77,8 @@ def agent_view(run: Run, agent: str, number: int, ties: str) -> Figure:
     figure.colorbar(ScalarMappable(Normalize(0, len(ranks) - 1), RANKS), ax=axes, label="rank")
     heights = len(np.unique(load.positions[moment.visible, HEIGHT].round(3)))
     axes.set_title(
-        f"{len(np.unique(ranks))} different ranks of boxes at {heights} heights\n"
+        f"{len(np.unique(ranks))} different ranks of boxes at {heights} heights"
+        f"{'' if policy.equalize else ' (this agent sees positions)'}\n"
         f"the favourite, item {item} of rank {ranks[greedy]:.1f}, "
         f"{'can' if can else 'cannot'} be lifted\n"
         f"{free} of {DRAWS} draws of the noise give a favourite that is free"

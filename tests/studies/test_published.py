@@ -40,8 +40,8 @@ PUBLISHED = {
     "01_task": "code-08 code-04",
     "02_equalization": "fig04 code-16 code-18",
     "03_network": "code-04",
-    "06_why_agents_go_wrong": "why-worth why-knowing 06-why-runs-fal-c8 why-phase why-runs-fall-14 "
-    "why-ways why-mask why-helps",
+    "06_why_agents_go_wrong": "why-worth why-guess why-knowing 06-why-runs-fal-c8 why-phase "
+    "why-runs-fall-14 why-ways why-mask why-helps",
     "10_lifting": "lifting-jams",
     "11_hyperparameters": "cell-17 d7126e58 tuning-explore cell-19 cell-24 cell-28",
     "12_training": "training-method cell-13 cell-19 cell-23 training-ends training-answer",

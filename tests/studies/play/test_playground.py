@@ -183,6 +183,7 @@ def test_the_settings_show_why_the_agent_is_stuck():
         title = agent_view(run, **settings | changed).axes[0].get_title()
         assert f" {'can' if can else 'cannot'} be lifted" in title
         assert ("item 637 of" in title) is not can
+        assert ("sees positions" in title) is ("agent" in changed)
         ranks = int(title.split()[0])
         assert ranks < 30 if "ties" in changed else ranks == 128
 
