@@ -26,6 +26,7 @@ LIBRARIES = {
     "mujoco": ("physics/mujoco.py",),
     "numba": ("fast/kernel.py", "support/compiled.py"),
     "numpy": ("",),
+    "openpyxl": ("orders/table.py",),
     "pandas": ("orders/", "agent/"),
     "plotly": ("load/view.py",),
     "pybullet": ("physics/bullet.py",),

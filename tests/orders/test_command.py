@@ -53,6 +53,7 @@ def test_it_reads_what_read_load_reads(tmp_path, capsys, monkeypatch):
     assert order["stop"].tolist() == [1, 2.1234567] and order["'=note"].tolist() == ["x", "'=1"]
     assert said.splitlines() == [
         "1 of 2 boxes moved by up to 90.0 mm",
+        "An order may overlook overlaps of up to 380 mm",
         "2 picks, 0 under and 0 behind others",
     ]
 
@@ -67,7 +68,10 @@ def test_what_is_refused_names_the_option_that_may_help(capsys, tmp_path):
     file.write_text(STACK.replace("size_x", "Länge"), encoding="utf-8")
     assert refused(capsys, file).endswith("size_x; see the option --column NAME=MEANING\n")
     file.write_text(STACK.replace("0.3\n", "wide\n"), encoding="utf-8")
-    assert refused(capsys, file) == "row 1 (id 'a'): size_z is 'wide'; expected a number\n"
+    assert (
+        refused(capsys, file)
+        == "row 1 (id 'a'): size_z is 'wide'; expected a number, at most 1,000,000\n"
+    )
     file.write_text(STACK.replace("size_z", "stop"), encoding="utf-8")
     assert "stop" in refused(capsys, file, "--by", "town")
 
@@ -84,27 +88,61 @@ def test_it_orders_by_stops_and_draws(tmp_path, capsys):
     order = pd.read_csv(out)
     assert order["id"].tolist() == ["b", "a", "c"] and order["weight"].tolist() == [2, 30, 3]
     assert picture.read_bytes().startswith(b"\x89PNG")
-    assert capsys.readouterr().err == "3 picks, 0 under and 0 behind others\n"
+    said = f"0 under and 0 behind others, 1 before their stop; the picture is {picture}\n"
+    assert capsys.readouterr().err == f"3 picks, {said}" and order["early"].tolist() == [1, 0, 0]
     assert refused(capsys, list_, "--by", "town").startswith("3 boxes have no number in 'town'")
 
 
-def test_an_order_is_written_before_a_picture_that_lacks_its_library(tmp_path, capsys, monkeypatch):
-    """It was lost once."""
+@pytest.mark.needs("symlinks")
+def test_nothing_is_written_before_all_can_be(tmp_path, capsys, monkeypatch):
+    """And no file over another one that is named."""
+    boxes, order, picture = (tmp_path / name for name in ("boxes.csv", "order.csv", "order.png"))
+    boxes.write_text(STACK, encoding="utf-8")
+    (tmp_path / "link").symlink_to(boxes)
+    held = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    for output, drawn in (
+        (boxes, picture),
+        (order, boxes),
+        (order, order),
+        (tmp_path / "link", picture),
+    ):
+        said = refused(capsys, boxes, "--output", output, "--picture", drawn)
+        assert said.endswith("one file; expected different ones\n")
+    folder = "; expected the name of a file\n"
+    assert refused(capsys, boxes, "--output", tmp_path, "--picture", picture).endswith(folder)
+    assert refused(capsys, boxes, "--output", order, "--picture", tmp_path).endswith(folder)
+    below, folder = (
+        tmp_path / "missing" / "order",
+        "expected it in a folder that is there and may be",
+    )
+    assert folder in refused(capsys, boxes, "--output", below, "--picture", picture)
+    assert folder in refused(capsys, boxes, "--output", order, "--picture", below)
     monkeypatch.setitem(sys.modules, "matplotlib", None)  # as if it were not installed
     for module in [name for name in sys.modules if name.startswith("unload.load.picture")]:
         monkeypatch.delitem(sys.modules, module)
-    said = refused(capsys, "--output", tmp_path / "order.csv", "--picture", tmp_path / "order.png")
+    said = refused(capsys, boxes, "--output", order, "--picture", picture)
     assert "--picture needs matplotlib, which is not installed; expected it: pip" in said
-    assert len(pd.read_csv(tmp_path / "order.csv")) == 136
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == held
 
 
-def test_names_of_any_language_are_written_to_any_console(tmp_path):
+def test_the_line_of_names_may_stand_below_a_title(tmp_path, capsys):
+    (tmp_path / "boxes.csv").write_text(f"Truck 7\n\n{STACK}", encoding="utf-8")
+    said = refused(capsys, tmp_path / "boxes.csv")
+    assert said.endswith("as line 3 may hold them; see the option --header\n")
+    command.main([str(tmp_path / "boxes.csv"), "--header", "3"])
+    assert capsys.readouterr().out.splitlines()[1] == "1,a,0,False,False"
+    assert "header is 0; expected an integer >= 1" in refused(capsys, "--header", "0")
+
+
+def test_names_of_any_language_are_written_to_any_console_and_drawn_without_a_display(tmp_path):
     """As UTF-8, where the console's encoding knows them or not; once a header was all."""
     (tmp_path / "boxes.csv").write_text(STACK.replace("a,", "Łódź 箱,"), encoding="utf-8")
     environment = os.environ | {"PYTHONIOENCODING": "cp1252", "PYTHONPATH": str(ROOT)}
-    program = [sys.executable, "-m", "unload", "boxes.csv"]
+    environment = environment | {"DISPLAY": "", "MPLBACKEND": "TkAgg"}
+    program = [sys.executable, "-m", "unload", "boxes.csv", "--picture", "order.png"]
     done = subprocess.run(program, cwd=tmp_path, env=environment, capture_output=True, check=True)
     assert done.stdout.decode("utf-8").splitlines()[1] == "1,Łódź 箱,0,False,False"
+    assert (tmp_path / "order.png").stat().st_size > 1_000
 
 
 @pytest.mark.needs("SIGPIPE")

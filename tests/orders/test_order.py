@@ -4,12 +4,18 @@ import inspect
 import textwrap
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from tests.load.walls import KINDS, of_corners, own_load
 from unload import Load, picking_order, read_load, stack_load
-from unload.orders.order import reachable
+from unload.load.boxes import OVERLAP
+from unload.orders.order import _by_rule, _reachable_first, reachable
+
+# A high box behind a tall one lies on a plank, which lies on what stands before the tall.
+CIRCLE = (
+    [(2, 0, 0), (3, 0, 0), (1, 1, 0.5), (1, 0.5, 0.8), (1, 1, 0)],
+    [(1, 1, 1.5), (1, 2, 0.5), (2.5, 1, 0.3), (1, 1.1, 0.5), (0.5, 1, 0.5)],
+)
 
 
 @pytest.mark.parametrize("kind", [*KINDS, "the paper's"])
@@ -21,7 +27,6 @@ def test_the_default_can_be_carried_out_from_the_entrance(kind, rng, full_load):
     assert sorted(order["item"]) == list(range(len(load)))
     assert not order[["covered", "behind"]].any(axis=None)
     assert order["id"].tolist() == order["item"].tolist()  # these loads have no ids
-    pd.testing.assert_frame_equal(order, picking_order(load, rule=reachable))
     # Of boxes that are free alike the foremost is picked, and of those the highest.
     present, front = np.ones(len(load), bool), (load.positions + load.sizes / 2)[:, 0]
     for item in order["item"]:
@@ -33,6 +38,51 @@ def test_the_default_can_be_carried_out_from_the_entrance(kind, rng, full_load):
             >= (load.positions[foremost, 2] + load.sizes[foremost, 2] / 2).max() - 2e-6
         )
         present[item] = False
+
+
+def by_definition(load: Load, stops: np.ndarray | None) -> list[int]:
+    """The items as the docstrings describe the order, pick by pick, from all pairs of boxes."""
+    low, high = load.positions - load.sizes / 2, load.positions + load.sizes / 2
+    overlap = np.minimum(high[:, None], high) - np.maximum(low[:, None], low) > OVERLAP
+    over = overlap[..., 0] & overlap[..., 1] & (load.positions[:, None, 2] < load.positions[:, 2])
+    front = overlap[..., 1] & overlap[..., 2] & (low[:, None, 0] < low[:, 0])
+    due, before = np.zeros(len(load)) if stops is None else stops.astype(float), None
+    while before is None or (due != before).any():  # at the earliest stop that waits for a box
+        due, before = np.minimum(due, np.where(over | front, due[:, None], np.inf).min(axis=0)), due
+    near, top = np.rint(high[:, [0, 2]].T / OVERLAP)
+    left, items = np.arange(len(load)), []
+    while len(left):
+        on, behind = (pairs[np.ix_(left, left)].any(axis=1) for pairs in (over, front))
+        first = np.lexsort((left, -top[left], -near[left], due[left], behind, on))[0]
+        items.append(left[first])
+        left = np.delete(left, first)
+    return items
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "the paper's", "strewn", "a circle"])
+def test_orders_are_those_of_their_definition(kind):
+    """Of a few boxes and of many, in any order of the list, with stops and without.
+
+    Strewn boxes float and form chains; equal ones are ties.
+    """
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        if kind == "the paper's":
+            load = stack_load(rng, walls=1 + seed % 3)
+        elif kind == "a circle":
+            load = of_corners(*CIRCLE)
+        elif kind == "strewn":
+            places = np.argwhere(rng.random((7, 5, 5)) < 0.2 + 0.2 * seed)
+            load = of_corners(places * [1, 0.5, 0.5], rng.choice([0.3, 0.5], (len(places), 3)))
+        else:
+            load = own_load(rng, kind)
+        few = rng.permutation(len(load))[: (300, 60, 8, 1)[seed]]
+        load = Load(load.positions[few], load.sizes[few])
+        for stops in (None, rng.integers(1 + seed, size=len(load)), rng.normal(size=len(load))):
+            expected = by_definition(load, stops)
+            assert _reachable_first(load, stops).tolist() == expected
+            if stops is None:
+                assert _by_rule(load, reachable).tolist() == expected
 
 
 def test_a_rule_knows_the_load_and_what_is_present(boxes):
@@ -77,7 +127,7 @@ def test_a_box_that_hangs_over_another_one_comes_out_first():
         ({"rule": reachable, "by": "stop"}, ValueError, "by and rule are given; expected one"),
         ({"by": ["stop"]}, TypeError, r"by is \['stop'\]; expected the name of a column"),
         ({"rule": 3}, TypeError, "rule is 3; expected a function"),
-        ({"by": "stop"}, ValueError, "by is 'stop'; expected one of the list's other columns"),
+        ({"by": "stp"}, ValueError, "by is 'stp'; .* one of the list's other columns: it has none"),
         ({"rule": lambda load, _: [np.full(len(load), np.nan)]}, ValueError, "holds nan"),
         ({"rule": lambda load, _: [np.ones(3)]}, ValueError, "rule returned has shape"),
         ({"rule": lambda load, _: 3}, TypeError, "what rule returned is 3; expected arrays"),
@@ -110,6 +160,22 @@ def test_an_order_by_stops_can_be_carried_out_and_takes_out_early_what_it_must(r
         early.append((turns[:last] > number).sum())
         assert early[-1] == (turn[out] > number).sum()
     assert early[0] > 20 and early[-1] == 0
+    left = [(turns[pick:] < turns[pick]).any() for pick in range(len(load))]
+    assert order["early"].tolist() == left
+
+
+def test_a_column_of_stops_is_found_in_capitals_or_not_and_the_exact_name_comes_first(boxes):
+    load = boxes((0.3, 0.2), (0.8, 0.2), (1.3, 0.2))
+    for names, by, items in (
+        (["Stop"], "stop", [1, 2, 0]),
+        (["Stop"], "-STOP", [0, 2, 1]),
+        (["stop", "Stop"], "stop", [0, 2, 1]),
+        (["-stop"], "-stop", [1, 2, 0]),
+    ):
+        extras = dict(zip(reversed(names), ([3, 1, 2], [1, 3, 2])))
+        load = Load(load.positions, load.sizes, extras=extras)
+        order = picking_order(load, by=by)
+        assert order["item"].tolist() == items and not order["early"].any()
 
 
 def test_the_rule_in_the_docstring_works(small_load):
@@ -128,11 +194,8 @@ def test_the_rule_in_the_docstring_works(small_load):
 
 
 def test_where_boxes_block_each_other_in_a_circle_none_is_lifted_with_another_on_it():
-    """A high box behind a tall one lies on a plank, which lies on what stands before the tall."""
     tall, foot, plank, high, far = range(5)
-    corners = [(2, 0, 0), (3, 0, 0), (1, 1, 0.5), (1, 0.5, 0.8), (1, 1, 0)]
-    sizes = [(1, 1, 1.5), (1, 2, 0.5), (2.5, 1, 0.3), (1, 1.1, 0.5), (0.5, 1, 0.5)]
-    order = picking_order(of_corners(corners, sizes))
+    order = picking_order(of_corners(*CIRCLE))
     assert order["item"].tolist() == [tall, high, plank, foot, far]
     assert order["behind"].tolist() == [True, False, False, False, False]
 

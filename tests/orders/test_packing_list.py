@@ -1,15 +1,12 @@
 """Packing lists: what they may hold, and what is refused by row and id."""
 
-import tracemalloc
-import zipfile
-
 import numpy as np
 import pandas as pd
 import pytest
 
 from unload import Load, read_load, stack_load
 from unload.load.boxes import _SMALLEST_EDGE
-from unload.orders.packing_list import LIMITS, ListError
+from unload.orders.packing_list import ListError
 
 CORNERS = "x_min,y_min,z_min,size_x,size_y,size_z"
 UNIT = "a,0,0,0,1,1,1"
@@ -114,6 +111,22 @@ def test_x_may_count_from_the_entrance_of_a_container_of_ones_own(written):
     assert read_load(path, container=(12, 2, 2), x_from="door").positions[0, 0] == 0.75
 
 
+def test_corners_that_are_read_as_centres_are_refused_with_what_to_write(written, tmp_path):
+    """Of a box on the floor the centre is none. What does not help is not said."""
+    columns, lines = "id,X (cm),y,z,size_x,size_y,size_z", ("a,600,1,0,1,1,1", "b,600,1,1,1,1,1")
+    said = "inside the container.*; if these are no centres but corners: X .cm.=x_min, y=y_min, z="
+    with pytest.raises(ListError, match=f"{said}z_min; see the argument columns$"):
+        read_load(written(*lines, columns=columns))
+    meant = {"X (cm)": "x_min", "y": "y_min", "z": "z_min"}
+    load = read_load(written(*lines, columns=columns), columns=meant)
+    assert load.positions.tolist() == [[6.5, 1.5, 0.5], [6.5, 1.5, 1.5]]
+    for line, argument in (("a,0,0.6,0.6,1,1,1", "container"), ("a,500,1,0,99,1,1", "units")):
+        with pytest.raises(
+            ListError, match=f"inside the container.* m; see the argument {argument}$"
+        ):
+            read_load(written(line, columns=columns))
+
+
 def test_small_faults_are_settled_and_logged(written, caplog):
     lines = "a,-0.001,0,0,1,1,1", "b,1,0,0,1,1,1", "c,0.5,0,1.003,1,1,1", "d,2.004,0,0,1,1,1"
     load = read_load(written(*lines))
@@ -121,6 +134,7 @@ def test_small_faults_are_settled_and_logged(written, caplog):
         [0, 0, 0], [1, 0, 0], [0.5, 0, 1], [2.004, 0, 0]
     ]  # fmt: skip
     assert "2 of 4 boxes moved by up to 3.0 mm" in caplog.text
+    assert "may overlook overlaps of up to 16 mm" in caplog.text  # twice 5 + 3
     with pytest.raises(ValueError, match=r"row 3 \(id 'c'\): floats.*see the argument tolerance"):
         read_load(written(*lines), tolerance=0.0012)
     bridge = "e,0,0,1.001,1,2,1"  # stands on the higher of two boxes, and holds down both
@@ -176,35 +190,29 @@ def test_wrong_arguments_are_refused(written, arguments, message):
         ([UNIT, "b,6.5,0,0,1,1,1"], r"'b'\): reaches from .* see the argument container$"),
         (["b,6.006,0,0,1,1,1"], r"'b'\): reaches from .* see the argument tolerance$"),
         ([UNIT, "a,1,0,0,1,1,1"], r"1 \(id 'a'\), row 2 \(id 'a'\): the same .* each box$"),
-        (["a,0,0,0,1,1,wide"], r"row 1 \(id 'a'\): size_z is 'wide'; expected a number$"),
-        (["a,0,0,0,1,1"], r"row 1 \(id 'a'\): size_z is ''; expected a number$"),
+        (
+            ["a,0,0,0,1,1,wide"],
+            r"row 1 \(id 'a'\): size_z is 'wide'; expected a number, at most 1,000,000$",
+        ),
+        (["a,0,0,0,1,1"], r"row 1 \(id 'a'\): size_z is ''; expected a number"),
+        (["a,1e308,0,0,1,1,1"], r"row 1 \(id 'a'\): x_min is '1e308'; expected a number, at most"),
+        (["a,0,0,0,1,1,0"], r"row 1 \(id 'a'\): edges of \[1. 1. 0.\] m; expected >= 0.002 m$"),
+        (["a,0,0,0,1,1,-1"], r"row 1 \(id 'a'\): edges of \[ 1.  1. -1.\] m; expected >= 0.002 m$"),
         ([f"a,0,0,0,1,1,{_SMALLEST_EDGE / 2}"], r"'a'\): edges of .* m; expected >= 0.002 m$"),
         ([f"{n},0,0,{n},1,1,1" for n in range(2, 8)], r"row 5 \(id '6'\) and 1 more: reaches"),
         ([f"{n},0,{n / 2},0,1,0.51,1" for n in range(5)], r"5 \(id '4'\): reaches"),
         ([], "has the columns .*'x_min'.* and no row; expected boxes"),
-        (["a,0,0,0,1,1,1,5,5"], "boxes.csv is not a readable list: .*Expected 7 fields in line 2"),
-        (["ä,0,0,0,1,1,1"], "boxes.csv is not a readable list: .*can't decode .*CSV in UTF-8"),
     ],
 )
 def test_lists_that_are_no_load_are_refused_by_row_and_id(written, lines, message):
-    path = written(*lines)
-    path.write_bytes(path.read_text(encoding="utf-8").encode("cp1252"))
     with pytest.raises(ValueError, match=message):
-        read_load(path)
+        read_load(written(*lines))
 
 
 @pytest.mark.parametrize("angle", ["179", "15.0", ""])
 def test_a_box_that_is_not_turned_by_quarters_is_refused(written, angle):
     path = written(f"{STACK[0]},180", f"{STACK[1]},{angle}", columns=f"id,{CORNERS},Rotation")
     with pytest.raises(ValueError, match=r"row 2 \(id 'b'\): .*Rotation"):
-        read_load(path)
-
-
-@pytest.mark.parametrize("text", ["", ",,\n,,\n", '"",""'])
-def test_files_without_a_name_are_refused(tmp_path, text):
-    path = tmp_path / "boxes.csv"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(ListError, match="boxes.csv (is not a readable list|holds empty cells)"):
         read_load(path)
 
 
@@ -218,30 +226,6 @@ def test_columns_are_refused_by_their_names(written):
         cells = ",".join("1" for _ in columns.split(","))
         with pytest.raises(ValueError, match=message):
             read_load(written(cells, columns=columns))
-
-
-def test_lists_of_more_than_a_container_holds_are_refused_before_memory_goes(written, tmp_path):
-    """One cell at the far end of a sheet once took 7 GB, and a small archive may hold much."""
-    table = pd.read_csv(written(*STACK))
-    long = pd.concat([table] * (LIMITS["rows"] // 2 + 1))
-    with pytest.raises(ValueError, match="the list has 3,002 rows; expected at most 3,000"):
-        read_load(long)
-    with pytest.raises(ValueError, match="the list has 207 columns; expected at most 200"):
-        read_load(pd.DataFrame(np.ones((2, 207))))
-    with pytest.raises(ValueError, match="the list has 26,.* bytes; expected at most 20,000,000"):
-        read_load(written("x" * 26_000_000))
-    openpyxl = pytest.importorskip("openpyxl")
-    with zipfile.ZipFile(tmp_path / "bomb.xlsx", "w", zipfile.ZIP_DEFLATED) as bomb:
-        bomb.writestr("xl/workbook.xml", b" " * 30_000_000)
-    book = openpyxl.Workbook()
-    book.active["XFD1048576"] = 1
-    book.save(tmp_path / "far.xlsx")
-    tracemalloc.start()
-    for name, message in (("bomb", "30,000,000 bytes"), ("far", "1,048,576 rows")):
-        with pytest.raises(ValueError, match=f"the list has {message}; expected at most"):
-            read_load(tmp_path / f"{name}.xlsx")
-    assert tracemalloc.get_traced_memory()[1] < 50_000_000
-    tracemalloc.stop()
 
 
 def test_a_row_that_is_too_long_becomes_smaller(written, caplog):

@@ -179,11 +179,13 @@ class Load:
         Along z the centres say which is the upper one, because boxes that overlap on the other two
         do not overlap there.
         """
+        # One row for each of the other axes: NumPy is fast along long rows.
         low, high = self.positions - self.sizes / 2, self.positions + self.sizes / 2
+        low, high = (np.delete(corner, axis, axis=1).T.copy() for corner in (low, high))
         pairs = []
         for box in range(len(self)):
-            shared = np.minimum(high[box], high) - np.maximum(low[box], low)
-            across = (np.delete(shared, axis, axis=1) > OVERLAP).all(axis=1)
+            shared = np.minimum(high[:, [box]], high) - np.maximum(low[:, [box]], low)
+            across = (shared > OVERLAP).all(axis=0)
             pairs.append(np.flatnonzero(across & (beyond > beyond[box])))
         return np.repeat(np.arange(len(self)), [*map(len, pairs)]), np.concatenate(pairs)
 

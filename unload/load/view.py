@@ -9,6 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
+from plotly.io import renderers
 
 from unload import task
 from unload.load import picture
@@ -30,6 +31,9 @@ _LABEL = (
 class View(go.Figure):
     """A plotly figure with a still picture of itself, for where plotly is not drawn.
 
+    A notebook shows it. Elsewhere ``show()`` opens it in a browser, and ``write_html(path)`` makes
+    a page of it, also where there is none.
+
     A code-hosting site, for example, shows the pictures in a notebook but runs no JavaScript.
     plotly draws its own still pictures in a browser, therefore ours come from elsewhere: they
     do not show what is added to the figure later.
@@ -41,6 +45,16 @@ class View(go.Figure):
     picture: Callable[[], bytes] | None = None
     _ipython_display_ = None  # plotly's own method would display the figure alone
     _repr_html_ = None  # plotly's own method would load a script from the network
+
+    def __repr__(self) -> str:
+        return "View, which a notebook shows; elsewhere show() opens it, write_html(path) keeps it"
+
+    def show(self, *args, **kwargs) -> None:
+        """Show the view in a notebook or in a browser; RuntimeError if plotly finds neither."""
+        if not (args or kwargs or renderers.default):
+            wanted = "expected one of them, or write_html(path) instead of show()"
+            raise RuntimeError(f"plotly finds no notebook and no browser here; {wanted}")
+        super().show(*args, **kwargs)
 
     def _repr_mimebundle_(self, include=None, exclude=None, **kwargs) -> dict:
         bundle = {_PLOTLY_MIMETYPE: json.loads(self.to_json()), "text/plain": "View"}
@@ -72,7 +86,8 @@ def view(
             ``item`` of ``unload.picking_order``: the first ten have colours from dark to light.
 
     Returns:
-        A plotly figure, which a notebook shows; elsewhere its method ``show`` does.
+        A plotly figure, which a notebook shows; a script calls its methods ``show()``, for a
+        browser, or ``write_html(path)``.
 
     Raises:
         TypeError, ValueError: an argument is not as described, more than four groups have names

@@ -1,5 +1,5 @@
 """Packing lists and orders of picks: geometry alone, without a lift and without an agent.
 
-Skip this room unless you have a list. Read ``packing_list``, ``settling``, ``order`` and
-``command``, in this order.
+Skip this room unless you have a list. Read ``table``, ``settling``, ``packing_list``, ``order``
+and ``command``, in this order.
 """

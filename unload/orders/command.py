@@ -1,17 +1,17 @@
 """The command ``unload``: an order of picks for a packing list."""
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
 from unload import task
-from unload.support import files
-from unload.support.checks import needed_for
+from unload.support import checks, files
 
 DESCRIPTION = """\
 Print an order in which the boxes of a packing list can be taken out: pick, id, item, covered
 (True if another box lay on it or hung over it), behind (True if another one stood in front of
-it), and the list's other columns.
+it), with --by early (True if a box of an earlier stop was left), and the list's other columns.
 
 A line of the list is a box. Its columns, in any order, in capitals or not:
   x_min, y_min, z_min      corner nearest to the origin (pos_x, ...), or x, y, z, the centre
@@ -48,6 +48,8 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--tolerance", type=float, default=0.005, help=text)
     text = "what a column is, such as Länge=size_x; may be repeated"
     parser.add_argument("--column", action="append", default=[], metavar="NAME=MEANING", help=text)
+    text = "line of the list that holds the names of its columns, if a title stands above"
+    parser.add_argument("--header", type=int, default=1, metavar="N", help=text)
     parser.add_argument("--version", action="version", version=f"unload {task.VERSION}")
     options = vars(parser.parse_args(arguments))
 
@@ -59,21 +61,42 @@ def main(arguments: list[str] | None = None) -> None:
     )
     options["columns"] = dict(entry.partition("=")[::2] for entry in columns)
     try:
+        _check_names(path, output, picture)
         load = read_load(EXAMPLE if path is None else path, **options)
         order = picking_order(load, by)
-        text = order.map(_guarded).rename(columns=_guarded)
-        _write(text.to_csv(index=False, lineterminator="\n"), output)
+        text = order.map(_guarded).rename(columns=_guarded).to_csv(index=False, lineterminator="\n")
         if picture is not None:
-            with needed_for("--picture"):
+            with checks.needed_for("--picture"):
                 from unload.load.picture import numbered
-            Path(picture).write_bytes(numbered(load, order["item"].to_numpy()))
+            drawn = numbered(load, order["item"].to_numpy())
+            files.write_atomically(picture, lambda file: file.write(drawn))
+        _write(text, output)
     except ListError as error:
         option = {"columns": "column NAME=MEANING", None: ""}.get(error.argument, error.argument)
         parser.exit(1, error.problem + (f"; see the option --{option}\n" if option else "\n"))
     except (ImportError, OSError, TypeError, ValueError) as error:  # ImportError: of an extra
         parser.exit(1, f"{error}\n")
-    covered, behind = order["covered"].sum(), order["behind"].sum()
-    print(f"{len(order)} picks, {covered} under and {behind} behind others", file=sys.stderr)
+    under, behind = order["covered"].sum(), order["behind"].sum()
+    said = f"{len(order)} picks, {under} under and {behind} behind others"
+    if by is not None:
+        said += f", {order['early'].sum()} before their stop"
+    if picture is not None:
+        said += f"; the picture is {Path(picture).resolve()}"
+    print(said, file=sys.stderr)
+
+
+def _check_names(path: str | None, output: str | None, picture: str | None) -> None:
+    """Raise ValueError if what is to be written cannot be, or would replace another file."""
+    names = [] if path is None else [Path(path)]
+    for option, name in {"--output": output, "--picture": picture}.items():
+        if name is not None:
+            names.append(checks.file(option, name))
+            if not os.access(names[-1].resolve().parent, os.W_OK):
+                wanted = "expected it in a folder that is there and may be written to"
+                raise ValueError(f"{option} is {name!r}; {wanted}")
+    identities = {n.stat()[1:3] if n.exists() else n.resolve() for n in names}
+    if len(identities) < len(names):
+        raise ValueError(f"{' and '.join(map(str, names))} are one file; expected different ones")
 
 
 def _guarded(cell):

@@ -1,6 +1,7 @@
 """An order of picks that can be carried out from the entrance, by the places of the boxes alone."""
 
 from collections.abc import Callable, Sequence
+from heapq import heapify, heappop, heappush
 
 import numpy as np
 import pandas as pd
@@ -25,10 +26,13 @@ def reachable(load: Load, present: np.ndarray) -> tuple[np.ndarray, ...]:
     Returns:
         Keys, (n,) each, the most important one first: the box with the largest ones is picked.
     """
-    front, top = (load.positions + load.sizes / 2)[:, [0, 2]].T
+    return ~load.covered(present), ~load.behind(present), *_places(load)
+
+
+def _places(load: Load) -> np.ndarray:
+    """The front and the top of each box, (2, n) float64."""
     # Rounded, so that equal places are equal, however they were computed.
-    foremost, highest = np.rint(front / OVERLAP), np.rint(top / OVERLAP)
-    return ~load.covered(present), ~load.behind(present), foremost, highest
+    return np.rint((load.positions + load.sizes / 2)[:, [0, 2]].T / OVERLAP)
 
 
 def picking_order(load: Load, by: str | None = None, rule: Rule | None = None) -> pd.DataFrame:
@@ -37,10 +41,11 @@ def picking_order(load: Load, by: str | None = None, rule: Rule | None = None) -
     No lift is simulated. What a learned policy picks is an episode of ``ContainerEnv(stack=...)``.
 
     Args:
-        load: see ``unload.read_load``.
-        by: a name in ``load.extras`` of numbers, such as ``"stop"``: of the boxes that can be
-            reached the lowest stop comes first, or with ``"-stop"`` the highest. Boxes of later
-            stops come out early only if they stand in the way of an earlier one.
+        load: see ``unload.read_load``. Its places are taken as they are: where they are measured,
+            an overlap smaller than their error may be overlooked.
+        by: a name in ``load.extras`` of numbers, such as ``"stop"``, in capitals or not: of the
+            boxes that can be reached the lowest stop comes first, or with ``"-stop"`` the highest.
+            Boxes of later stops come out early only if they stand in the way of an earlier one.
         rule: instead of ``reachable``, a function of the load and what is present that returns
             keys. What can be reached, the heaviest first::
 
@@ -51,64 +56,112 @@ def picking_order(load: Load, by: str | None = None, rule: Rule | None = None) -
     Returns:
         A row for each pick: ``pick``, counted from 1; ``id`` of the box, the number of its item if
         the load has no ids; ``item``, its row in the load; ``covered`` and ``behind``, True if a
-        box lay on it or hung over it, or stood in front of it, see ``Load``; and the load's
-        ``extras``.
+        box lay on it or hung over it, or stood in front of it, see ``Load``; with ``by``,
+        ``early``, True if a box of an earlier stop was left; and the load's ``extras``.
 
     Raises:
         TypeError, ValueError: an argument is not as described, or ``rule`` returns other than
             keys.
     """
     check_supported(load)
+    stops = None
     if rule is None:
-        rule = reachable if by is None else _by_stop(load, by)
+        stops = None if by is None else _stops(load, by)
+        items = _reachable_first(load, stops)
     elif by is not None:
         raise ValueError("by and rule are given; expected one of them")
-    elif not callable(rule):
+    elif callable(rule):
+        items = _by_rule(load, rule)
+    else:
         raise TypeError(f"rule is {rule!r}; expected a function of a load and what is present")
-    present, rows = np.ones(len(load), bool), []
-    for pick in range(1, len(load) + 1):
+
+    table = pd.DataFrame({"pick": 1 + np.arange(len(load)), "id": items, "item": items})
+    if load.ids is not None:
+        table["id"] = load.ids[items]
+    turns = np.argsort(items)  # of each box
+    for name, (boxes, others) in (("covered", load.covers), ("behind", load.fronts)):
+        table[name] = np.isin(items, boxes[turns[others] > turns[boxes]])
+    if stops is not None:
+        left = stops[items]
+        table["early"] = left > np.minimum.accumulate(left[::-1])[::-1]
+    for name, values in load.extras.items():
+        table[f"{name} in the list" if name in table else name] = values[items]
+    return table
+
+
+def _by_rule(load: Load, rule: Rule) -> np.ndarray:
+    """The items in the order of a rule, which is asked before each pick, (n,) int64."""
+    present, order = np.ones(len(load), bool), []
+    while present.any():
         returned = rule(load, present.copy())
         checks.instance("what rule returned", returned, Sequence, "arrays of numbers")
         keys = checks.finite_array("what rule returned", returned, (None, len(load)))
         # lexsort takes its last key first and the smallest first; equal boxes stay in the list's
         # order.
         items = np.flatnonzero(present)
-        item = items[np.lexsort(-keys[::-1, items])[0]]
-        name = item if load.ids is None else load.ids[item]
-        rows.append((pick, name, item, load.covered(present)[item], load.behind(present)[item]))
-        present[item] = False
-    table = pd.DataFrame(rows, columns=["pick", "id", "item", "covered", "behind"])
-    for name, values in load.extras.items():
-        table[f"{name} in the list" if name in table else name] = values[table["item"]]
-    return table
+        order.append(items[np.lexsort(-keys[::-1, items])[0]])
+        present[order[-1]] = False
+    return np.array(order)
 
 
-def _by_stop(load: Load, by: str) -> Rule:
-    """The rule of an order by stops that can be carried out.
+def _reachable_first(load: Load, stops: np.ndarray | None) -> np.ndarray:
+    """The items in the order of ``reachable``, (n,) int64, the lowest stops first if given.
 
-    A box is due at the earliest stop among itself and all boxes that cannot come out before it; so
-    a box leaves before its own stop only to free an earlier one.
+    The same as by asking the rule before each pick. But what a rule prefers among the boxes that
+    can be reached does not change, and a pick frees only those that waited for this very box.
     """
-    due = _stops(load, by)
+    keys = [*-_places(load)[::-1]]
+    by_preference = np.lexsort(keys if stops is None else [*keys, _due(load, stops)])
+    preference = np.argsort(by_preference).tolist()
+
+    # For how many others each box waits, and which boxes wait for it: of those on it, and in front.
+    waits, waiting = [], []
+    for boxes, others in (load.covers, load.fronts):
+        waits.append(np.bincount(boxes, minlength=len(load)))
+        ends = np.cumsum(np.bincount(others, minlength=len(load)))
+        waiting.append(np.split(boxes[np.argsort(others)], ends[:-1]))
+
+    def key(box: int) -> tuple[bool, bool, int]:
+        return bool(waits[0][box]), bool(waits[1][box]), preference[box]
+
+    # A box that has become free is pushed again, with a smaller key; its older entries come later.
+    heap, present, order = [*map(key, range(len(load)))], np.ones(len(load), bool), []
+    heapify(heap)
+    while heap:
+        item = by_preference[heappop(heap)[-1]]
+        if present[item]:
+            present[item] = False
+            order.append(item)
+            for counts, boxes in zip(waits, waiting):
+                counts[boxes[item]] -= 1
+                for box in boxes[item][counts[boxes[item]] == 0]:
+                    heappush(heap, key(box))
+    return np.array(order)
+
+
+def _due(load: Load, stops: np.ndarray) -> np.ndarray:
+    """When each box is due, (n,) float64: at the earliest stop that waits for it.
+
+    This is the lowest of its own and of those of all boxes that cannot come out before it; so a
+    box leaves before its own stop only to free an earlier one.
+    """
+    due, before = stops.copy(), None
     blocked, blocking = np.hstack([load.fronts, load.covers])
-    for _ in range(len(load)):  # as long as the longest chain, at most
+    while before is None or (due < before).any():
+        before = due.copy()
         np.minimum.at(due, blocking, due[blocked])
-
-    def rule(load: Load, present: np.ndarray) -> Sequence[np.ndarray]:
-        uncovered, in_front, *others = reachable(load, present)
-        return uncovered, in_front, -due, *others
-
-    return rule
+    return due
 
 
 def _stops(load: Load, by: str) -> np.ndarray:
     """The stop of each box, (n,) float64, so that the lowest is the first; see ``by``."""
     checks.instance("by", by, str, "the name of a column")
     falling = by.startswith("-") and by not in load.extras
-    if (name := by[1:] if falling else by) not in load.extras:
-        raise ValueError(
-            f"by is {by!r}; expected one of the list's other columns: {', '.join(load.extras)}"
-        )
+    named = {name.lower(): name for name in load.extras} | {name: name for name in load.extras}
+    asked = by[1:] if falling else by
+    if (name := named.get(asked, named.get(asked.lower()))) is None:
+        known = ", ".join(load.extras) or "it has none"
+        raise ValueError(f"by is {by!r}; expected one of the list's other columns: {known}")
     stops = pd.to_numeric(pd.Series(load.extras[name]), errors="coerce").to_numpy(float)
     wrong = np.flatnonzero(~np.isfinite(stops))
     if wrong.size:

@@ -5,6 +5,7 @@ import numpy as np
 from unload.load.boxes import BELOW, CONTACT_TOLERANCE, OVERLAP, Load
 
 SLACK = 0.0005  # m, at each side of a face: physics makes boxes 1 mm narrower
+Rows = list[tuple[int, np.ndarray]]  # each box, and those that stand right before it
 
 
 def settle(
@@ -26,62 +27,95 @@ def settle(
         How far each centre moves, and by how much each edge becomes smaller, (n, 3) float64 in m
         each; 0 where a box fits.
     """
-    high, moved, edges = low + sizes, low.copy(), sizes.copy()
-    pair_tolerance = 2 * tolerance
+    high, edges = low + sizes, sizes.copy()
+    start, end = low.copy(), high.copy()  # of the settled boxes
+    start[:, 2] = _bottoms(low, sizes, tolerance)
+    end[:, 2] = start[:, 2] + sizes[:, 2]
 
-    # From the floor upwards, each box sinks or rises onto the highest one below it.
-    top, order = high[:, 2].copy(), np.argsort(low[:, 2], kind="stable")
-    for count, box in enumerate(order):
-        others = order[:count]
-        share = np.minimum(high[box], high[others]) - np.maximum(low[box], low[others])
-        beneath = share[:, :2].min(axis=1) > pair_tolerance
-        under = others[beneath & (share[:, 2] <= pair_tolerance)]
-        most = pair_tolerance if under.size else tolerance
-        if abs(low[box, 2] - high[under, 2].max(initial=0)) <= most:
-            moved[box, 2] = top[under].max(initial=0)
-            top[box] = moved[box, 2] + sizes[box, 2]
-
-    # Those that share height now are pushed apart, along x or y: away from the rear wall or the
-    # left one, and back where the container ends.
+    # Those that share height now are pushed apart, along x first, and those that share depth then
+    # along y.
     for axis in (0, 1):
-        end, end_x = container[axis], moved[:, 0] + edges[:, 0]
-        order, before = np.argsort(low[:, axis] + high[:, axis], kind="stable"), []
-        for count, box in enumerate(order):
-            others = order[:count]
-            share = np.minimum(high[box], high[others]) - np.maximum(low[box], low[others])
-            beside = share[:, axis] <= pair_tolerance
-            if axis == 0:  # along y otherwise, or nowhere
-                beside &= (share[:, 0] <= share[:, 1]) & (share[:, 1] > -pair_tolerance)
-            else:  # what is apart along x needs nothing along y
-                depth = np.minimum(end_x[box], end_x[others]) - np.maximum(
-                    moved[box, 0], moved[others, 0]
-                )
-                beside &= depth > OVERLAP
-            level = np.minimum(top[box], top[others]) - np.maximum(moved[box, 2], moved[others, 2])
-            before.append(others[beside & (level > OVERLAP)])
-
-        # The longest row through a box is the longest path in the graph of neighbours, followed
-        # forwards and backwards. If it is too long, all boxes in it become a little smaller.
-        wide = sizes[:, axis]
-        left, right = np.zeros(len(low)), np.zeros(len(low))
-        for box, others in zip(order, before):
-            left[box] = (left + wide)[others].max(initial=0)
-        for box, others in zip(order[::-1], before[::-1]):
-            right[others] = np.maximum(right[others], right[box] + wide[box])
-        fitting = wide * np.minimum(1, end / (left + wide + right))
-        wide = edges[:, axis] = np.where(wide - fitting <= tolerance, fitting, wide)
-
-        first = np.where(low[:, axis] >= -tolerance, low[:, axis].clip(0), low[:, axis])
-        last = np.where(high[:, axis] <= end + tolerance, end - wide, np.inf)
-        for box, others in zip(order, before):
-            first[box] = max(first[box], (first + wide)[others].max(initial=-np.inf))
-        for box, others in zip(order[::-1], before[::-1]):
-            last[others] = np.minimum(last[others], last[box] - wide[others])
-        moved[:, axis] = np.minimum(first, last)
+        rows = _rows(axis, low, high, start, end, tolerance)
+        room = container[axis]
+        edges[:, axis] = _fitting(sizes[:, axis], rows, room, tolerance)
+        start[:, axis] = _apart(low[:, axis], high[:, axis], edges[:, axis], rows, room, tolerance)
+        end[:, axis] = start[:, axis] + edges[:, axis]
 
     smaller = np.where(sizes - edges > OVERLAP / 2, sizes - edges, 0.0)
-    moves = moved - low - smaller / 2  # of the centres
+    moves = start - low - smaller / 2  # of the centres
     return np.where(np.abs(moves) > OVERLAP / 2, moves, 0.0), smaller
+
+
+def _bottoms(low: np.ndarray, sizes: np.ndarray, tolerance: float) -> np.ndarray:
+    """The height of each bottom, (n,) float64, once each box lies on the highest one below it."""
+    high = low + sizes
+    bottom, top = low[:, 2].copy(), high[:, 2].copy()
+    order = np.argsort(low[:, 2], kind="stable")  # from the floor upwards
+    for count, box in enumerate(order):
+        others = order[:count]
+        share = _shared(low, high, box, others)
+        beneath = share[:, :2].min(axis=1) > 2 * tolerance
+        under = others[beneath & (share[:, 2] <= 2 * tolerance)]
+        most = 2 * tolerance if under.size else tolerance  # the floor is where it is
+        if abs(low[box, 2] - high[under, 2].max(initial=0)) <= most:
+            bottom[box] = top[under].max(initial=0)
+            top[box] = bottom[box] + sizes[box, 2]
+    return bottom
+
+
+def _rows(axis: int, low, high, start, end, tolerance: float) -> Rows:
+    """The boxes along x or y, from the wall on, each with the ones that stand before it in a row.
+
+    Measured corners say what stands before what, settled ones what shares a height or a depth.
+    """
+    rows, order = [], np.argsort(low[:, axis] + high[:, axis], kind="stable")
+    for count, box in enumerate(order):
+        others = order[:count]
+        share, settled = _shared(low, high, box, others), _shared(start, end, box, others)
+        beside = (share[:, axis] <= 2 * tolerance) & (settled[:, 2] > OVERLAP)
+        if axis == 0:  # along y otherwise, or nowhere
+            beside &= (share[:, 0] <= share[:, 1]) & (share[:, 1] > -2 * tolerance)
+        else:  # what is apart along x needs nothing along y
+            beside &= settled[:, 0] > OVERLAP
+        rows.append((box, others[beside]))
+    return rows
+
+
+def _shared(low: np.ndarray, high: np.ndarray, box: int, others: np.ndarray) -> np.ndarray:
+    """The stretch that a box shares with each of the others on each axis, (k, 3) float64 in m.
+
+    Below 0 it is the gap between them.
+    """
+    return np.minimum(high[box], high[others]) - np.maximum(low[box], low[others])
+
+
+def _fitting(edges: np.ndarray, rows: Rows, room: float, tolerance: float) -> np.ndarray:
+    """Edges along one axis, (n,) float64, a little smaller where a row is longer than the room.
+
+    Of all rows in which a box stands the longest counts.
+    """
+    before, after = np.zeros(len(edges)), np.zeros(len(edges))  # how long it is, without the box
+    for box, others in rows:
+        before[box] = (before[others] + edges[others]).max(initial=0)
+    for box, others in rows[::-1]:
+        after[others] = np.maximum(after[others], after[box] + edges[box])
+    longest = np.maximum(before + edges + after, OVERLAP)  # boxes without a width are refused later
+    fitting = edges * np.minimum(1, room / longest)
+    return np.where(edges - fitting <= tolerance, fitting, edges)
+
+
+def _apart(low, high, edges, rows: Rows, room: float, tolerance: float) -> np.ndarray:
+    """Where each box begins along one axis, (n,) float64, so that it is clear of its row.
+
+    It is pushed away from the wall by what stands before it, and back where the room ends.
+    """
+    first = np.where(low >= -tolerance, low.clip(0), low)
+    last = np.where(high <= room + tolerance, room - edges, np.inf)
+    for box, others in rows:
+        first[box] = (first[others] + edges[others]).max(initial=first[box])
+    for box, others in rows[::-1]:
+        last[others] = np.minimum(last[others], last[box] - edges[others])
+    return np.minimum(first, last)
 
 
 def uncarried(load: Load) -> np.ndarray:
