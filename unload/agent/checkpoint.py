@@ -34,6 +34,11 @@ class TrainResult(NamedTuple):
     policy: Greedy
     curve: pd.DataFrame
 
+    def __repr__(self) -> str:
+        end = self.curve.iloc[-1]
+        said = f"{end['picks']:,.0f} picks, MSR {100 * end['success_rate']:.1f} % at the end"
+        return f"TrainResult({self.policy!r}, curve of {len(self.curve)} points: {said})"
+
 
 def settings_of_run(
     config: TrainConfig, stack: Callable | None = None, change: Callable | None = None

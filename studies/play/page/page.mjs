@@ -31,11 +31,10 @@ element("features").append(...tiles);
 
 // Files beside the page: in the repository, or in its site. A copy that stands alone names them.
 for (const link of document.querySelectorAll("a[data-file]")) {
-  const { file } = link.dataset;
-  const inside = (folder) => location.pathname.includes(folder);
-  if (inside("/play/")) link.href = `../${file.replace(/\.\w+$/, ".html")}`;
-  else if (inside("/figures/")) link.href = `../${file}`;
-  else link.title = `In the repository: ${file}`;
+  const { file } = link.dataset, place = location.pathname;
+  if (place.includes("/play/")) link.href = `../${file.replace(/\.\w+$/, ".html")}`;
+  else if (place.includes("/figures/")) link.href = `../${file}`;
+  else link.append(` (in the repository: ${file})`);
 }
 
 const send = (command) => worker.postMessage({ command, config, task, number });
