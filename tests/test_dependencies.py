@@ -115,11 +115,9 @@ def test_what_is_installed_is_what_the_lock_says():
     for name in names:  # which grows meanwhile
         if name not in found:
             found[name] = version(name).split("+")[0]
-            needed = map(Requirement, requires(name) or [])
-            here = [
-                line for line in needed if not line.marker or line.marker.evaluate({"extra": ""})
-            ]
-            names += [canonicalize_name(line.name) for line in here]
+            for line in map(Requirement, requires(name) or []):
+                if not line.marker or line.marker.evaluate({"extra": ""}):
+                    names.append(canonicalize_name(line.name))
     assert found == {name: str(locks[name].specifier)[2:] for name in found}
     assert len(found) > 2 * len(wheels.lines())
 
