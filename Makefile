@@ -3,7 +3,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help figures test quick lint lab notebooks paper bench ready dist book browser clean
+.PHONY: help figures test quick lint lab notebooks paper bench ready dist book lock browser clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1	\2/p' Makefile | expand -t 20
@@ -31,6 +31,10 @@ book:  ## make a site of README, notebooks and solutions: build/book/index.html
 	rm -rf build/book
 	$(BIN)/python -m sphinx -q -W --keep-going -E -d build/doctrees -c notebooks/book . build/book
 	$(BIN)/python notebooks/book/links.py build/book
+
+lock:  ## make environment.lock again of environment.txt; needs uv (pip install uv)
+	uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate \
+	environment.txt pyproject.toml --extra book --extra browser -o environment.lock $(UPGRADE)
 
 browser:  ## use notebooks in JupyterLab and the page that trains in a browser without a window
 	@$(PYTHON) make.py ready browser

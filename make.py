@@ -13,7 +13,9 @@ import platform
 import shutil
 import subprocess
 import sys
+import time
 import venv
+from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent
@@ -22,11 +24,12 @@ PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 MARK = VENV / "made-by-make"  # nothing is removed from a folder without it
 STAMP = VENV / "ready"  # says what is installed
 PIP = ("-m", "pip", "install", "--quiet", "--disable-pip-version-check")
+LOCKED = ("-c", "environment.lock")  # the versions of all that is installed with what is named
 EXTRAS = ("book", "browser")  # of pyproject.toml; the Makefile has them installed when needed
-# Variables with which pip finds or puts packages elsewhere, or installs less than it is told to.
-# Those that say where it gets packages from are the user's.
-ELSEWHERE = ("PYTHONPATH", "PIP_PREFIX", "PIP_PYTHON", "PIP_ROOT", "PIP_TARGET", "PIP_USER")
-ELSEWHERE += ("PIP_DRY_RUN", "PIP_NO_DEPS")
+# Settings with which pip puts packages elsewhere, or installs less than it is told to. Those that
+# say where it gets packages from are the user's.
+ELSEWHERE = ("dry-run", "no-deps", "prefix", "python", "root", "target", "user")
+VARIABLES = ("PYTHONPATH", *("PIP_" + name.upper().replace("-", "_") for name in ELSEWHERE))
 # A process a core, eight at most, because each takes 1 GB.
 PYTEST = ("-m", "pytest", "-n", "logical", "--maxprocesses", "8", "--dist", "loadfile")
 # Left out: tests marked slow; those that compile anew, kill runs or simulate every box, by name;
@@ -60,16 +63,21 @@ def main(name: str = "", *more: str) -> None:
 
 def run(*arguments: str, without: tuple = ()) -> None:
     """Run the environment's Python without these variables, and end with it if it fails."""
-    environment = {name: os.environ[name] for name in os.environ if name.upper() not in without}
-    # Its text is UTF-8, on Windows, too.
-    environment["PYTHONUTF8"] = "1"
-    done = subprocess.run([str(PYTHON), *arguments], cwd=ROOT, env=environment)
+    done = python(*arguments, without=without)
     if done.returncode:
         sys.exit(done.returncode)
 
 
+def python(*arguments: str, without: tuple = (), **options):
+    """Run the environment's Python without these variables, as ``subprocess.run`` does."""
+    environment = {name: os.environ[name] for name in os.environ if name.upper() not in without}
+    # Its text is UTF-8, on Windows, too.
+    environment["PYTHONUTF8"] = "1"
+    return subprocess.run([str(PYTHON), *arguments], cwd=ROOT, env=environment, **options)
+
+
 def make_ready(*extras: str) -> None:
-    """Install what the two files name, and then the extras, unless this has been done.
+    """Install what environment.txt and the extras name, unless this has been done.
 
     The stamp's lines say of which Python and folder the environment is, and what was installed. It
     is away while pip runs, because pip takes packages that it left half installed for whole: an
@@ -78,60 +86,114 @@ def make_ready(*extras: str) -> None:
     if not {*extras} <= {*EXTRAS}:
         sys.exit(f"ready takes {' and '.join(EXTRAS)} alone; got {' '.join(extras)}")
     files = hashlib.sha256()
-    for name in ("environment.txt", "pyproject.toml"):
+    for name in ("environment.txt", "environment.lock", "pyproject.toml"):
         files.update((ROOT / name).read_bytes())
     base = files.hexdigest()
-    steps = {base: [("-r", "environment.txt"), ("--no-deps", "--editable", ".")]}
+    # The package's own build takes the setuptools that has just been installed.
+    editable = ("--no-deps", "--no-build-isolation", "--editable", ".")
+    steps = {base: [("-r", "environment.txt", *LOCKED), editable]}
     for extra in extras:
-        steps[extra] = [("-c", "environment.txt", "--editable", f".[{extra}]")]
+        steps[extra] = [(*LOCKED, "--editable", f".[{extra}]")]
 
-    python = describe_python()
-    stamp = STAMP.read_bytes() if STAMP.is_file() else b""
-    done = stamp.decode(errors="replace").splitlines()
-    if done[:1] != [python]:
-        make_environment()
-        done = [describe_python()]
-    elif python.split()[0] != "{}.{}".format(*sys.version_info):
-        print(f"{VENV} is of Python {python.split()[0]}, which is used")
-    if base not in done:
-        done = done[:1]
-    for step in steps:
-        if step not in done:
-            before = STAMP.read_bytes() if STAMP.is_file() else b""
-            STAMP.unlink(missing_ok=True)
-            for arguments in steps[step]:
-                try:
-                    run(*PIP, *arguments, without=ELSEWHERE)
-                except SystemExit:  # pip itself gave up: nothing is half done
-                    if before:
-                        STAMP.write_bytes(before)
-                    raise
-            done.append(step)
-            STAMP.write_text("\n".join(done), encoding="utf-8")
+    with alone():
+        described = describe_python()
+        stamp = STAMP.read_bytes() if STAMP.is_file() else b""
+        done = stamp.decode(errors="replace").splitlines()
+        if done[:1] != [described]:
+            make_environment()
+            done = [describe_python()]
+        elif described.split()[0] != "{}.{}".format(*sys.version_info):
+            print(f"{VENV} is of Python {described.split()[0]}, which is used")
+        if base not in done:
+            done = done[:1]
+        for step in steps:
+            if step not in done:
+                install(steps[step])
+                done.append(step)
+                STAMP.write_text("\n".join(done), encoding="utf-8")
+
+
+def install(calls: list) -> None:
+    """Let pip install with the arguments of each call; meanwhile there is no stamp."""
+    check_settings()
+    before = STAMP.read_bytes() if STAMP.is_file() else b""
+    STAMP.unlink(missing_ok=True)
+    for arguments in calls:
+        try:
+            run(*PIP, *arguments, without=VARIABLES)
+        except SystemExit:  # pip itself gave up: nothing is half done
+            if before:
+                STAMP.write_bytes(before)
+            raise
+
+
+def check_settings() -> None:
+    """End where pip's own files, such as pip.conf, hold one of the settings ``ELSEWHERE``."""
+    listed = ("-m", "pip", "config", "list")
+    said = python(*listed, without=VARIABLES, capture_output=True).stdout
+    for line in said.decode(errors="replace").splitlines():
+        name, _, value = line.partition("=")
+        section, _, option = name.partition(".")
+        off = value.strip("'").lower() in ("0", "false", "no", "off")
+        if section in ("global", "install") and option in ELSEWHERE and not off:
+            sys.exit(
+                f"a file of pip's settings says {line}, so that packages would miss {VENV}; take "
+                "this out of the file, which pip config debug names, and try again"
+            )
 
 
 def describe_python() -> str:
     """Version and folder of the environment's Python, as it says; nothing where it does not run."""
     code = "import sys; print('%d.%d' % sys.version_info[:2], ascii(sys.prefix))"
     try:
-        done = subprocess.run([str(PYTHON), "-I", "-c", code], capture_output=True, text=True)
+        return python("-I", "-c", code, capture_output=True).stdout.decode().strip()
     except OSError:  # it is gone, or of another machine
         return ""
-    return done.stdout.strip()
 
 
-def make_environment() -> None:
-    """Make ``.venv``, in place of what this function made before; anything else is left alone."""
+@contextmanager
+def alone():
+    """Let one make.py at a time look after ``.venv``, and only after a folder of its own making.
+
+    The system ends the lock with the process, however that ends.
+    """
     there = VENV.exists() and (not VENV.is_dir() or any(VENV.iterdir()))
     if VENV.is_symlink() or there and not MARK.exists():
         sys.exit(
             f"{VENV} was not made by this make.py, which therefore leaves it alone; remove or "
             "rename it, and try again"
         )
-    if there:
+    if not there:
+        VENV.mkdir(exist_ok=True)
+        MARK.touch()
+    with MARK.open("rb") as file:
+        if not lock(file):
+            print(f"Another make.py is at work on {VENV}; waiting for it")
+            while not lock(file):
+                time.sleep(1)
+        yield
+
+
+def lock(file) -> bool:
+    """Lock an open file, unless another process has; return whether it is locked."""
+    try:
+        if os.name == "nt":
+            import msvcrt
+
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError):  # the second on Windows
+        return False
+    return True
+
+
+def make_environment() -> None:
+    """Make ``.venv``, in place of what this function made before."""
+    if any(path != MARK for path in VENV.iterdir()):
         print(f"Making {VENV} again: it is of another folder or Python, or was not finished")
-    VENV.mkdir(exist_ok=True)
-    MARK.touch()
     STAMP.unlink(missing_ok=True)  # first: what is half cleared is not finished
     for path in VENV.iterdir():
         if path.is_dir() and not path.is_symlink():

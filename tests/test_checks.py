@@ -3,6 +3,7 @@
 import importlib
 import inspect
 import re
+import sys
 from unittest.mock import patch
 
 import numpy as np
@@ -66,6 +67,12 @@ def test_what_is_wrong_is_said_and_stops_a_solution(capsys):
     for name in ("03/9", "99/1", "3"):
         with pytest.raises(ValueError, match=f"no exercise is called '{name}'"):
             check(name, 1)
+
+
+def test_what_needs_pybullet_is_not_called_wrong_where_it_is_missing(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    check("21/2", lambda observations, masks, rng: observations[:, :, 2].argmin(axis=1))
+    assert capsys.readouterr().out.startswith("21/2: cannot be checked here: heaps are")
 
 
 def test_what_stops_is_shown_as_the_readers_own_line():

@@ -1,8 +1,11 @@
 """The libraries: named in pyproject.toml, pinned in environment.txt, and imported somewhere."""
 
+import json
+import os
 import re
 import tomllib
-from importlib.metadata import packages_distributions, version
+from importlib.metadata import packages_distributions, requires, version
+from itertools import product
 
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
@@ -75,6 +78,60 @@ def test_what_is_installed_is_what_is_pinned():
     here = [n for n, line in wheels.lines().items() if not line.marker or line.marker.evaluate()]
     found = {name: version(name).split("+")[0] for name in here}
     assert found == {name: each for name, each in PINNED.items() if name in found}
+
+
+def locked() -> list[Requirement]:
+    """The lines of environment.lock."""
+    text = (ROOT / "environment.lock").read_text(encoding="utf-8").splitlines()
+    return [Requirement(line) for line in text if not line.startswith("#")]
+
+
+def pinned_for(lines: list[Requirement], system: str, minor: int) -> dict[str, str]:
+    """The versions that are pinned for a system and a Python 3.x, by name."""
+    place = dict(zip(("sys_platform", "platform_machine"), wheels.SYSTEMS[system]))
+    place["os_name"] = "nt" if system == "Windows" else "posix"
+    place |= {"python_version": f"3.{minor}", "python_full_version": f"3.{minor}.9"}
+    found = [line for line in lines if not line.marker or line.marker.evaluate(place)]
+    names = [canonicalize_name(line.name) for line in found]
+    assert len(names) == len({*names})
+    return {name: str(line.specifier)[2:] for name, line in zip(names, found)}
+
+
+def test_the_lock_agrees_with_what_it_is_made_of():
+    """If not: ``make lock``. Also in the packages that only some systems and Pythons need."""
+    own = [*wheels.lines().values()]
+    extras = [Requirement(line) for extra in ON_DEMAND for line in EXTRAS[extra]]
+    for system, minor in product(wheels.SYSTEMS, wheels.PYTHONS):
+        wanted = pinned_for([*own, *extras], system, minor)
+        found = pinned_for(locked(), system, minor)
+        assert wanted.items() <= found.items() and len(found) > 3 * len(wanted)
+        assert ("pybullet" in found) == ("pybullet" in wanted)
+
+
+def test_what_is_installed_is_what_the_lock_says():
+    """All that environment.txt names here, and all that this needs in turn."""
+    locks = {line.name: line for line in locked() if not line.marker or line.marker.evaluate()}
+    names, found = [n for n, line in wheels.lines().items() if n in locks], {}
+    for name in names:  # which grows meanwhile
+        if name not in found:
+            found[name] = version(name).split("+")[0]
+            for line in map(Requirement, requires(name) or []):
+                if not line.marker or line.marker.evaluate({"extra": ""}):
+                    names.append(canonicalize_name(line.name))
+    assert found == {name: str(locks[name].specifier)[2:] for name in found}
+    assert len(found) > 2 * len(wheels.lines())
+
+
+def test_machines_that_others_lend_install_the_same():
+    """Binder, and what ``.devcontainer`` describes: on the Python that PyBullet has a wheel for."""
+    text = (ROOT / ".binder/requirements.txt").read_text(encoding="utf-8")
+    named = re.findall(r"^--(?:requirement|constraint) (.+)", text, re.M)
+    files = [(ROOT / ".binder" / name).resolve() for name in named]
+    assert files == [ROOT / "environment.txt", ROOT / "environment.lock"]
+    assert (ROOT / ".binder/runtime.txt").read_text(encoding="utf-8") == "python-3.11\n"
+    assert os.name == "nt" or os.access(ROOT / ".binder/postBuild", os.X_OK)
+    device = (ROOT / ".devcontainer/devcontainer.json").read_text(encoding="utf-8")
+    assert json.loads(device)["image"].startswith("python:3.11-")
 
 
 def test_what_is_imported_is_named():

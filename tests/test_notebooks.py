@@ -7,11 +7,12 @@ import threading
 import time
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 
 import nbformat
 import papermill
 import pytest
+from IPython.core.interactiveshell import InteractiveShell
 
 from notebooks import run
 from notebooks.book import links, pages
@@ -174,6 +175,33 @@ def test_views_are_preferred_to_pictures_and_animations_wait_for_their_button():
     assert "Plotly.newPlot" in first["text/html"] and "a view" in first["text/html"]
     assert "cdn" not in first["text/html"] and "Plotly.animate" not in first["text/html"]
     assert 'id="view-1"' in first["text/html"] and 'id="view-2"' in second["text/html"]
+
+
+def test_where_to_open_a_notebook_without_installing_is_said_where_the_repository_is_known():
+    for page in ("README", *pages.IN_COLAB):
+        assert (run.HERE.parent / f"{pages.IN_COLAB[0]}.ipynb").exists()
+        links = re.findall('href="https://(.+?)"', pages.ways_in(page, "me/mine"))
+        assert len(links) == 2 and all("me/mine" in link for link in links)
+        assert pages.ways_in(page, "") == ""
+    assert "colab" in pages.ways_in("notebooks/02_equalization", "me/mine")
+    assert pages.ways_in("notebooks/10_lifting", "me/mine") == ""
+
+
+@pytest.mark.parametrize("name", pages.IN_COLAB)
+@pytest.mark.parametrize("colab", [True, False])
+def test_the_first_cell_installs_in_colab_and_does_nothing_elsewhere(monkeypatch, name, colab):
+    own = cells(run.HERE.parent / f"{name}.ipynb", "code")[0]
+    ran, shell = [], InteractiveShell()
+    google = {"google.colab": ModuleType("colab")} if colab else {"google.colab": None}
+    for module, value in {"google": ModuleType("google"), **google}.items():
+        monkeypatch.setitem(sys.modules, module, value)
+    monkeypatch.setattr("builtins.input", lambda said: "https://example.org/mine")
+    shell.system = lambda command: ran.append(shell.var_expand(command))
+    shell.run_line_magic = lambda name, rest, **_: ran.append(f"{name} {rest}")
+    shell.run_cell(text(own)).raise_error()
+    wanted = [r"git clone --depth 1 https://example.org/mine unload", "cd unload", "pip install .*"]
+    assert len(ran) == (3 if colab else 0)
+    assert all(map(re.fullmatch, wanted, ran))
 
 
 def test_links_that_lead_nowhere_are_found(tmp_path):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from notebooks import run
 from studies.falls.long import LONG
 from studies.grid import read_grid
 from studies.paper.training import PAPER, PAPER_CELLS
@@ -40,6 +41,16 @@ def test_commands_are_those_of_the_makefile():
     text = README + (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     named = set(re.findall(r"(?:^|`)make ([a-z]+)", text, re.MULTILINE))
     assert {"figures", "test", "lint", "quick"} <= named <= targets
+
+
+def test_the_minutes_of_a_group_are_those_of_its_notebooks():
+    rows = re.findall(r"^\| \*\*\w+\*\* \| (.+) \| (\d+) \| (\d+) \| .+ \|$", README, re.M)
+    assert len(rows) == 3
+    for links, *minutes in rows:
+        files = re.findall(r"\((notebooks/.+?)\)", links)
+        counts = [run.measured(ROOT / file) for file in files]
+        for said, name in zip(minutes, ("minutes", "to solve")):
+            assert abs(int(said) - sum(count[name] for count in counts)) <= 5, links
 
 
 def test_the_way_to_contribute_names_files_that_exist():

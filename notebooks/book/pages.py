@@ -1,5 +1,6 @@
 """What the site needs beyond Sphinx's settings: contents, interactive views, scripts."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -17,6 +18,11 @@ PLAYED = "play/index.html"  # where the page that trains stands in the site
 DOWNLOAD = re.compile(r'<a class="reference download internal" [^>]*train_it_yourself.html">')
 DESCRIPTION = "Container unloading by reinforcement learning: a paper reproduced and explained"
 SHARED = "_static/shared.png"  # what a link to the site shows elsewhere
+# Where the pages of a repository on GitHub open without an installation.
+CODESPACES = '<a href="https://codespaces.new/{}">Codespaces</a>'
+BINDER = '<a href="https://mybinder.org/v2/gh/{}/HEAD?urlpath=lab/tree/{}.ipynb">Binder</a>'
+COLAB = '<a href="https://colab.research.google.com/github/{}/blob/HEAD/{}.ipynb">Colab</a>'
+IN_COLAB = "notebooks/00_playground", "notebooks/02_equalization"  # they install the package there
 NEEDS_KERNEL = "*This view needs a kernel: open the notebook in JupyterLab.*"
 
 
@@ -105,9 +111,19 @@ def resolve_folders(app, page) -> None:
             link.replace_self(link.children)
 
 
+def ways_in(name: str, repository: str) -> str:
+    """Links above the first page and two notebooks; none where no ``repository`` is given."""
+    if not repository or name not in ("README", *IN_COLAB):
+        return ""
+    first = name == "README"
+    ways = [(CODESPACES if first else COLAB).format(repository, name)]
+    ways.append(BINDER.format(repository, IN_COLAB[0] if first else name))
+    return f"<p>Open without installing anything: {' · '.join(ways)}</p>"
+
+
 def finish_page(app, name: str, template: str, context: dict, page) -> None:
     """Load plotly's script before interactive views, open the page that trains, say what all is."""
-    body = context.get("body", "")
+    body = ways_in(name, os.environ.get("REPOSITORY", "")) + context.get("body", "")
     if "Plotly.newPlot" in body:
         app.add_js_file("plotly.min.js", priority=0)
     context["body"] = DOWNLOAD.sub(f'<a href="{context["pathto"](PLAYED, resource=True)}">', body)

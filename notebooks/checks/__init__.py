@@ -36,6 +36,10 @@ class Unusable(Exception):
     """What a function returns cannot be judged; it says why."""
 
 
+class NotHere(Exception):
+    """No answer can be judged on this machine; it says why."""
+
+
 class Missing(Exception):
     """A function that is to be written has an empty body still; it says which."""
 
@@ -98,7 +102,7 @@ def exercise(name: str) -> Exercise:
 
 
 def judged(wanted: Exercise, answer: object) -> str:
-    """What is said of an answer: ``"right"``, or a sentence that begins with ``"not yet"``."""
+    """What is said of an answer: ``"right"``, ``"not yet"`` and why, or why none can be judged."""
     if answer is None:
         return MISSING
     try:
@@ -109,6 +113,8 @@ def judged(wanted: Exercise, answer: object) -> str:
         right = wanted.right(given)
     except Missing:
         return MISSING
+    except NotHere as error:
+        return f"cannot be checked here: {error}"
     except Unusable as error:
         return f"not yet: {error}"
     except Exception as error:

@@ -97,8 +97,8 @@ def test_bad_arguments_are_refused():
 
 @pytest.mark.parametrize("returned", [[3.7], [128]])
 def test_bad_actions_of_a_policy_are_refused_and_the_environment_closed(monkeypatch, returned):
-    closed = []
-    monkeypatch.setattr(ContainerVectorEnv, "close", lambda env: closed.append(env))
+    closed, close = [], ContainerVectorEnv.close
+    monkeypatch.setattr(ContainerVectorEnv, "close", lambda env: closed.append(close(env)))
     with pytest.raises((TypeError, ValueError), match="what policy returned .* expected"):
         evaluate(lambda *_: returned, 1)
     assert len(closed) == 1

@@ -77,7 +77,10 @@ def test_a_saved_policy_comes_back_with_its_card(tmp_path, equalized, ties):
     assert (loaded.equalize, loaded.ties, loaded.network.n_features) == (equalized, ties, 6)
     assert all(map(torch.equal, weights(loaded.network), weights(policy.network)))
     assert loaded.card == {"version": VERSION, "loads": "my own", "msr": {"these": 0.5}}
-    assert "\n  loads: my own\n  msr: {'these': 0.5}" in repr(loaded)
+    said = f"Greedy(PEQNetwork, equalize={equalized}, ties={ties!r})"
+    assert repr(loaded) == said == str(Greedy(peq(6), equalized, ties))
+    assert str(loaded).startswith(f"{said}\n  version: ")
+    assert str(loaded).endswith("\n  loads: my own\n  msr: {'these': 0.5}")
     save_policy(loaded, path)
     assert path.read_bytes() == whole
     for card in ({"msr": np.float32(0.5)}, {"seeds": {10: 0.5, 9: 1.0}}):

@@ -1,4 +1,5 @@
 import os
+import re
 import signal
 from dataclasses import replace
 from io import StringIO
@@ -30,8 +31,11 @@ LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock"}
 @pytest.mark.parametrize("fields", RUNS.values(), ids=RUNS)
 def test_what_a_run_leaves(tmp_path, fields):
     config = TrainConfig(**fields, epsilon_final=0.9)  # so that its points differ to the end
-    curve = train(config, tmp_path, progress=(log := StringIO())).curve
+    result = train(config, tmp_path, progress=(log := StringIO()))
     assert "100%" in log.getvalue() and "MSR=" in log.getvalue()
+    curve = result.curve
+    said = rf"TrainResult\(Greedy\(.*\), curve of {len(curve)} points: {config.picks:,} picks, MSR "
+    assert re.fullmatch(rf"{said}\d+\.\d % at the end\)", str(result))
     assert {path.name for path in tmp_path.iterdir()} == LEFT
     assert tuple(curve.columns) == Point._fields
     interval = config.log_interval * config.num_envs

@@ -34,6 +34,11 @@ class TrainResult(NamedTuple):
     policy: Greedy
     curve: pd.DataFrame
 
+    def __repr__(self) -> str:
+        end = self.curve.iloc[-1]
+        said = f"{end['picks']:,.0f} picks, MSR {100 * end['success_rate']:.1f} % at the end"
+        return f"TrainResult({self.policy!r}, curve of {len(self.curve)} points: {said})"
+
 
 def settings_of_run(
     config: TrainConfig, stack: Callable | None = None, change: Callable | None = None
@@ -133,7 +138,9 @@ class RunFolder:
             with suppress(OSError):  # it is gone already, or the folder is read-only
                 path.unlink()
         network = make_network(config.network, config.n_features)
-        return TrainResult(load_policy(self.policy, network), pd.read_csv(self._curve_file))
+        # Older versions of pandas otherwise miss the last bit of some numbers.
+        curve = pd.read_csv(self._curve_file, float_precision="round_trip")
+        return TrainResult(load_policy(self.policy, network), curve)
 
     def _check_same(self, stored: dict, settings: dict) -> None:
         # As text, in which 1, 1.0 and True are told apart, and not-a-number is itself.

@@ -65,10 +65,11 @@ class Greedy:
 
     def __repr__(self) -> str:
         kind = type(self.network).__name__
-        head = f"Greedy({kind}, equalize={self.equalize}, ties={self.ties!r})"
-        if self.card is None:
-            return f"{head}, no card"
-        return "\n".join([head, *(f"  {name}: {value}" for name, value in self.card.items())])
+        return f"Greedy({kind}, equalize={self.equalize}, ties={self.ties!r})"
+
+    def __str__(self) -> str:
+        card = self.card or {}
+        return "\n".join([repr(self), *(f"  {name}: {value}" for name, value in card.items())])
 
     def __call__(
         self, observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator

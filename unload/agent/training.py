@@ -182,7 +182,9 @@ def train(
         progress: show a progress bar with speed, MSR and loss: on stdout, or in a text file.
         stack: makes the loads, as in ``ContainerEnv``; the paper's if None.
         callback: is called with each new point of the curve, a dict by the columns of
-            ``TrainResult.curve``. If it returns False, the run ends there, and is finished.
+            ``TrainResult.curve``, such as ``wandb.log``, or for TensorBoard
+            ``lambda point: writer.add_scalars("run", point, point["picks"])``. If it returns False,
+            the run ends there, and is finished.
         change: is called with the ``Training`` before its first pick, and replaces methods.
         same_code: say that ``stack``, ``change`` and ``network`` are the functions that the run in
             ``run_dir`` was begun with. Only their names are kept, so that without it such a run is

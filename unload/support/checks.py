@@ -173,6 +173,7 @@ def needed_for(what: str) -> Iterator[None]:
         names = [name for name in EXTRAS if name in said]
         if not names:
             raise
-        wanted = f'expected it: pip install "unload[{EXTRAS[names[0]]}]"'
+        # Not by the package's name, under which an index may have another one.
+        wanted = f'expected it: in the checkout, pip install ".[{EXTRAS[names[0]]}]"'
         message = f"{what} needs {names[0]}, which is not installed; {wanted}"
         raise ModuleNotFoundError(message) from error

@@ -31,11 +31,10 @@ element("features").append(...tiles);
 // Files beside the page: in the repository, or in its site. A copy that stands alone says where.
 for (const link of document.querySelectorAll("a[data-file]")) {
   const { file } = link.dataset;
-  const [number] = file.match(/\d+/) ?? [];
   const folder = location.pathname.split("/").at(-2);
   if (folder === "play") link.href = `../${file.replace(/\.\w+$/, ".html")}`;
   else if (folder === "figures") link.href = `../${file}`;
-  else if (number) link.append(` (notebook ${number} in the repository)`);
+  else link.append(` (in the repository: ${file})`);
 }
 
 const send = (command) => worker.postMessage({ command, config, task, number });
