@@ -20,6 +20,7 @@ if TYPE_CHECKING:  # what ``_PLACES`` says, for type checkers
     from unload.agent.greedy import Greedy as Greedy
     from unload.agent.greedy import load_policy as load_policy
     from unload.agent.greedy import save_policy as save_policy
+    from unload.agent.resume import check_resume as check_resume
     from unload.agent.training import train as train
     from unload.env.container import ContainerEnv as ContainerEnv
     from unload.env.equalization import equalize as equalize
@@ -42,6 +43,7 @@ _PLACES = {
     "PEQNetwork": "network.peq",
     "TrainConfig": "agent.config",
     "build_load": "load.substacks",
+    "check_resume": "agent.resume",
     "equalize": "env.equalization",
     "evaluate": "agent.evaluation",
     "load_policy": "agent.greedy",

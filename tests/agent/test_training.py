@@ -11,10 +11,10 @@ import torch
 from tests.agent import runs
 from tests.agent.runs import CONTAINER, RUNS, HeightNetwork, assert_same, at_step, interrupt, metres
 from unload import TrainConfig, evaluate, load_policy, train
-from unload.agent.checkpoint import RunFolder
 from unload.agent.curve import Curve, Point
 from unload.agent.training import Training, warn_of_other_bits
 from unload.env.vector import ContainerVectorEnv
+from unload.runs.folder import RunFolder
 from unload.support import files
 
 
@@ -132,8 +132,8 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, monke
         train(config, tmp_path, progress=False)
     left = {"checkpoint.npz", "curve.csv", "lock"}
     assert {path.name for path in tmp_path.iterdir()} <= left
-    stored = files.read_arrays(tmp_path / "checkpoint.npz")
-    assert all(np.isfinite(array).all() for name, array in stored.items() if "network" in name)
+    stored = files.read_nested(tmp_path / "checkpoint.npz")["run"]["agent"]["network"]
+    assert all(np.isfinite(weights).all() for weights in stored.values())
 
 
 @pytest.mark.parametrize(
