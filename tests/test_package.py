@@ -18,16 +18,16 @@ PACKAGES = ("unload", "studies")
 
 # The files and folders of the package that may import a library.
 LIBRARIES = {
-    "PIL": ("load/",),
+    "PIL": ("drawing/",),
     "filelock": ("support/files.py",),
     "gymnasium": ("__init__.py", "env/", "plain.py", "agent/"),
     "llvmlite": ("fast/kernel.py",),
-    "matplotlib": ("load/",),
+    "matplotlib": ("drawing/",),
     "mujoco": ("physics/mujoco.py",),
     "numba": ("fast/kernel.py", "support/compiled.py"),
     "numpy": ("",),
     "pandas": ("orders/", "agent/"),
-    "plotly": ("load/view.py",),
+    "plotly": ("drawing/view.py",),
     "pybullet": ("physics/bullet.py",),
     "safetensors": ("network/weights.py",),
     "torch": ("network/", "fast/", "plain.py", "agent/"),

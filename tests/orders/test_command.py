@@ -91,7 +91,7 @@ def test_it_orders_by_stops_and_draws(tmp_path, capsys):
 def test_an_order_is_written_before_a_picture_that_lacks_its_library(tmp_path, capsys, monkeypatch):
     """It was lost once."""
     monkeypatch.setitem(sys.modules, "matplotlib", None)  # as if it were not installed
-    for module in [name for name in sys.modules if name.startswith("unload.load.picture")]:
+    for module in [name for name in sys.modules if name.startswith("unload.drawing.picture")]:
         monkeypatch.delitem(sys.modules, module)
     said = refused(capsys, "--output", tmp_path / "order.csv", "--picture", tmp_path / "order.png")
     assert "--picture needs matplotlib, which is not installed; expected it: pip" in said

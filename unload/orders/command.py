@@ -65,7 +65,7 @@ def main(arguments: list[str] | None = None) -> None:
         _write(text.to_csv(index=False, lineterminator="\n"), output)
         if picture is not None:
             with needed_for("--picture"):
-                from unload.load.picture import numbered
+                from unload.drawing.picture import numbered
             Path(picture).write_bytes(numbered(load, order["item"].to_numpy()))
     except ListError as error:
         option = {"columns": "column NAME=MEANING", None: ""}.get(error.argument, error.argument)

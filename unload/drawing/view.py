@@ -11,7 +11,7 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
 from unload import task
-from unload.load import picture
+from unload.drawing import picture
 from unload.load.boxes import Load, check_load
 from unload.support import checks
 
