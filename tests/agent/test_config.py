@@ -37,6 +37,12 @@ def test_epsilon_falls_linearly_and_stays():
     assert values == pytest.approx([0.9, 0.5, 0.1, 0.1, 0.1])
 
 
+def test_a_run_draws_other_loads_than_an_evaluation_of_its_seed():
+    seeds = TrainConfig(seed=3).seeds()
+    assert len({*seeds}) == 3 and not {*seeds} & {*TrainConfig(seed=4).seeds()}
+    assert not {*seeds} & {*np.random.SeedSequence(3).generate_state(3).tolist()}
+
+
 COUNTS = ("picks", "num_envs", "batch_size", "n_features", "target_update_interval", "max_picks")
 
 
