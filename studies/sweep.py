@@ -19,7 +19,7 @@ from tqdm import tqdm
 from studies.results import code_of, run_record
 from unload.agent.config import TrainConfig, settings_of_run
 from unload.agent.training import Training, train
-from unload.runs.folder import RunFolder
+from unload.checkpoint.folder import RunFolder
 from unload.support import files
 
 WINDOWS = os.name == "nt"

@@ -14,8 +14,8 @@ from unload import TrainConfig, evaluate, load_policy, train
 from unload.agent.curve import Curve, Point
 from unload.agent.rollout import Rollout
 from unload.agent.training import Training, warn_of_other_bits
+from unload.checkpoint.folder import RunFolder
 from unload.env.vector import ContainerVectorEnv
-from unload.runs.folder import RunFolder
 from unload.support import files
 
 

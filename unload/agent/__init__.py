@@ -2,7 +2,7 @@
 
 Read ``policies``, ``learner`` (the update in plain PyTorch), ``dqn`` and ``greedy``; then
 ``config``, ``replay``, ``rollout``, ``curve`` and ``training``; then ``resume`` and ``evaluation``.
-``unload.fast`` holds the compiled twin of the learner, and ``unload.runs`` keeps a run on disk.
+``unload.fast`` holds the compiled twin of the learner; ``unload.checkpoint`` keeps a run on disk.
 
 An argument that is not as described is a TypeError or ValueError that names it; values or weights
 that are not finite are a FloatingPointError, before they choose or teach anything.

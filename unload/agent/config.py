@@ -7,11 +7,11 @@ import gymnasium
 import numpy as np
 
 from unload import task
+from unload.checkpoint.settings import plain
 from unload.env.equalization import TIES
 from unload.env.observation import MOST_NOISE, POSITION_NOISE
 from unload.network.factory import NETWORKS
 from unload.physics.bullet import ENGINES, engine_of
-from unload.runs.settings import plain
 from unload.support import checks
 
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")

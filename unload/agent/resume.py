@@ -10,7 +10,7 @@ import numpy as np
 
 from unload.agent.config import TrainConfig, settings_of_run
 from unload.agent.training import Training
-from unload.runs.folder import RunFolder
+from unload.checkpoint.folder import RunFolder
 
 
 def check_resume(

@@ -24,9 +24,9 @@ from unload.agent.dqn import DQN
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
+from unload.checkpoint.folder import RunFolder
 from unload.load.boxes import Load, check_stack
 from unload.network.factory import make_network
-from unload.runs.folder import RunFolder
 from unload.support import checks, files
 
 CHECKPOINT_INTERVAL = 600.0  # seconds between two of them

@@ -13,8 +13,8 @@ import pytest
 from tests.agent.runs import CONTAINER, assert_same, few_walls, interrupt_run, kill_run, metres
 from unload import TrainConfig, stack_load, train
 from unload.agent.config import settings_of_run
+from unload.checkpoint.settings import package
 from unload.physics.bullet import ENGINES, engine_of
-from unload.runs.settings import package
 from unload.support import files
 
 
@@ -90,7 +90,7 @@ def test_a_checkpoint_that_is_not_of_this_code_or_of_no_run_is_refused(checkpoin
 def test_a_run_of_another_package_is_named(checkpoint, monkeypatch):
     """Where it is not finished it is refused, unless the caller says that the code is the same."""
     config, other, this = TrainConfig(**CONTAINER), "unload 0.2.0 (00ff)", package()
-    monkeypatch.setattr("unload.runs.folder.package", lambda: other)
+    monkeypatch.setattr("unload.checkpoint.folder.package", lambda: other)
     wanted = re.escape(f"is of {this}; expected {other}, or same_code=True")
     with pytest.raises(ValueError, match=f"checkpoint.npz {wanted}"):
         train(config, checkpoint.parent, progress=False)

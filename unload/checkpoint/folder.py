@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from unload.runs.settings import package
+from unload.checkpoint.settings import package
 from unload.support import checks, files
 
 FORMAT = 14  # of the checkpoints
