@@ -3,7 +3,6 @@
     python notebooks/run.py                    reduced counts, results in build/notebooks
     python notebooks/run.py --in-place         their own counts, results kept in them
     python notebooks/run.py 03 solutions/08    only those whose names start so
-    python notebooks/run.py --measure          words, minutes, words per sentence; runs nothing
 
 The reduced counts stand in reduced.toml. Notebooks run side by side; with --in-place one after the
 other, because some measure how fast something is. --jobs says how many run at a time. If a cell
@@ -13,7 +12,6 @@ fails, those in hand are finished, and the run ends with a non-zero exit status.
 import argparse
 import logging
 import os
-import re
 import shutil
 import sys
 import tomllib
@@ -23,7 +21,6 @@ from pathlib import Path
 
 import joblib
 import nbformat
-import pandas as pd
 import papermill
 from tqdm import tqdm
 
@@ -31,18 +28,12 @@ from notebooks.checks import REDUCED
 from unload.support import files
 
 HERE = Path(__file__).resolve().parent
-README = HERE.parent / "README.md"
 BUILD = HERE.parent / "build" / "notebooks"
 RUNS = HERE.parent / "runs"
 MEMORY = 2 * 2**30  # bytes for a notebook at reduced counts and what it starts
 # What libraries read who would otherwise take all cores for each notebook.
 THREADS = ("OMP_NUM_THREADS", "LOKY_MAX_CPU_COUNT")
 ASIDE = ("solutions", "report")  # folders of notebooks that are not of the course itself
-# What a student takes to read: minutes for a figure, and for a cell of more lines.
-WORDS_A_MINUTE, FIGURE, LONG_CELL = 180, 0.5, 5
-EXERCISE = r"^(?:\*\*Exercise \d.*?\*\*|\d\.) "  # how one begins; its minutes follow in brackets
-MINUTES = r"\((\d+) minutes?(, may be skipped)?\)"
-UNREAD = {"parameters", "hide-input"}  # tags of cells that are not counted as code to read
 WIDGET_MIMETYPE = "application/vnd.jupyter.widget-view+json"
 
 
@@ -59,84 +50,6 @@ def key(notebook: Path) -> str:
 def reduced_parameters(notebook: Path) -> dict:
     """The values of reduced.toml for a notebook; none if it is not listed."""
     return tomllib.loads((HERE / "reduced.toml").read_text(encoding="utf-8")).get(key(notebook), {})
-
-
-def prose(path: Path) -> str:
-    """The Markdown of a notebook or of the README."""
-    if path == README:
-        return path.read_text(encoding="utf-8")
-    cells = nbformat.read(path, as_version=4).cells
-    return "\n\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
-
-
-def opening(path: Path) -> str:
-    """What decides whether one reads on: the first section of a chapter, all of other texts."""
-    text = prose(path)
-    return text.partition("\n## ")[0] if path.parent == HERE else text
-
-
-def rendered(text: str) -> str:
-    """Markdown without pictures, the addresses of links and the lines between rows of a table."""
-    text = re.sub(r"!\[[^\]]*\]\([^)]*\)|^\|[-|]+\|$", "", text, flags=re.M)
-    return re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
-
-
-def sentences(text: str) -> list[str]:
-    """The sentences of Markdown, those of lists included; code, tables and headings left out."""
-    text = rendered(re.sub(r"```.*?```|\$\$.*?\$\$", "", text, flags=re.DOTALL))
-    blocks = re.split(r"\n\s*\n|\n(?=[-*] |\d+\. |\||#)", text)
-    prose = [" ".join(block.split()) for block in blocks if block.lstrip()[:1] not in ("|", "#")]
-    parts = [re.split(r"(?<=[.!?])[”)*]*\s+(?=[“(*A-Z0-9`])", block) for block in prose]
-    return [sentence for block in parts for sentence in block if len(sentence.split()) > 2]
-
-
-def measured(notebook: Path) -> dict[str, float]:
-    """Count ``words``, ``figures`` and ``long cells``, the ``minutes`` to read them, ``exercises``.
-
-    Those have minutes of their own, as the notebook says them: all that are not ``skipped`` take
-    ``to solve``.
-    """
-    cells, text = nbformat.read(notebook, as_version=4).cells, prose(notebook)
-    code = [cell for cell in cells if cell.cell_type == "code"]
-    counts = {
-        "words": len(text.split()),
-        "figures": sum("image/png" in out.get("data", {}) for cell in code for out in cell.outputs),
-        "long cells": sum(
-            len(cell.source.splitlines()) > LONG_CELL
-            for cell in code
-            if not UNREAD & set(cell.metadata.get("tags", [])) and "check(" not in cell.source
-        ),
-    }
-    solved = re.findall(EXERCISE + MINUTES, text.partition("\n## ")[2], re.M)
-    own = {
-        "exercises": len(solved),
-        "to solve": sum(int(minutes) for minutes, skipped in solved if not skipped),
-        "skipped": sum(int(minutes) for minutes, skipped in solved if skipped),
-    }
-    minutes = counts["words"] / WORDS_A_MINUTE + FIGURE * (counts["figures"] + counts["long cells"])
-    return counts | {"minutes": minutes} | own
-
-
-def measures(chosen: list[Path], readme: Path | None) -> str:
-    """A table of what is measured, with the core and the course as a whole.
-
-    Sentences are those of ``opening``: ``a sentence`` is their mean number of words.
-    """
-    table = pd.DataFrame({key(path): measured(path) for path in chosen}).T
-    course = ~table.index.str.contains("/")
-    sums = {"core": table[table.index.str.startswith("0")], "course": table[course]}
-    texts = {key(path): path for path in chosen} | ({"README": readme} if readme else {})
-    for name, rows in sums.items():
-        table.loc[name] = rows.sum()
-    for name, path in texts.items():
-        counts = [len(sentence.split()) for sentence in sentences(opening(path))]
-        table.loc[name, "a sentence"] = sum(counts) / len(counts)
-        table.loc[name, "longest"] = max(counts)
-    if readme:
-        table.loc["README", "words"] = len(re.findall(r"\b\w\S*", rendered(prose(readme))))
-    return table.to_string(
-        na_rep="", float_format="{:.0f}".format, formatters={"a sentence": "{:.1f}".format}
-    )
 
 
 def run(notebook: Path, output: Path, parameters: dict) -> None:
@@ -234,7 +147,6 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("names", nargs="*", help="beginnings of notebook names; all if none")
     parser.add_argument("--in-place", action="store_true", help="keep the results in the notebooks")
-    parser.add_argument("--measure", action="store_true", help="say how long each takes to read")
     parser.add_argument("--jobs", type=int, help="how many notebooks run at a time")
     options = parser.parse_args()
     options.names = [name.replace("\\", "/") for name in options.names]  # as Windows writes them
@@ -245,9 +157,6 @@ def main() -> int:
             parser.error(f"no notebook starts with {name!r}; expected 00, say")
     beginnings = tuple(options.names) or ""
     chosen = [path for path in notebooks() if key(path).startswith(beginnings)]
-    if options.measure:
-        print(measures(chosen, README if not options.names else None))
-        return 0
     jobs = options.jobs or (1 if options.in_place else side_by_side())
     return 0 if run_chosen(chosen, options.in_place, min(jobs, len(chosen))) else 1
 

@@ -30,10 +30,9 @@ from studies.results import (
     write_table,
 )
 from studies.sweep import run_sweep
-from unload.agent.checkpoint import RunFolder, settings_of_run
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, policy_of, settings_of
-from unload.agent.training import Training
+from unload.agent.training import Training, finished_run
 from unload.network.weights import read_weights, write_weights
 from unload.support import checks, files
 
@@ -154,8 +153,8 @@ def _publish(grid: Grid, configs: dict, kept: Path, fingerprint: str) -> None:
     # All that is published is read back from the folders of the runs, whenever they were trained.
     policies, curves = {}, {}
     for name, config in done.items():
-        settings = settings_of_run(config, change=grid.cells[cell_of(name)].change)
-        policies[name], curves[name] = RunFolder(kept / name).result(config, settings)
+        change = grid.cells[cell_of(name)].change
+        policies[name], curves[name] = finished_run(kept / name, config, change)
     if grid.measure is None:
         write_curves(grid, curves)
         if grid.policies:

@@ -6,7 +6,6 @@ settings, code, versions, machine and time.
 """
 
 import ast
-import json
 import os
 import platform
 import subprocess
@@ -23,7 +22,6 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 import joblib
-import numpy as np
 import pandas as pd
 import torch
 from joblib import Parallel, delayed
@@ -36,7 +34,6 @@ from unload.support import files
 
 PACKAGES = ("gymnasium", "joblib", "mujoco-core", "numba", "numpy", "pandas", "pybullet", "torch")
 COMMAND = "python -m studies"
-ARRAY = "array of this file"  # stands for an array in the JSON of a kept answer
 
 
 class Result(NamedTuple):
@@ -61,15 +58,14 @@ def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Resu
 
     Args:
         question: all that the answer depends on: an answer to another question is not taken.
-        compute: gives the answer, of NumPy's arrays of numbers or text and what JSON can hold:
-            lists, dictionaries by text, text, numbers, None.
+        compute: gives the answer, see ``files.write_nested`` for what it may hold.
 
     Returns:
         The answer and its record, as they are read back; tuples have become lists, and NumPy's
         scalars Python's.
 
     Raises:
-        TypeError: the answer has something else, be it a subclass of these.
+        TypeError: the answer holds something else.
         OSError: the folder cannot be made, or a folder with files stands where the answer should.
     """
     path = Path(folder) / f"{joblib.hash(question)}.npz"
@@ -82,49 +78,16 @@ def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Resu
             if path.is_dir():
                 path.rmdir()
             print(f"{error}. It is computed again", file=sys.stderr)
-    _write_answer(path, measured(compute))
+    answer = measured(compute)._asdict()
+    with files.locked(path.parent, wait=True):  # another command may ask the same
+        files.write_nested(path, answer)
     return _read_answer(path)
 
 
-def _write_answer(path: Path, answer: Result) -> None:
-    arrays: dict[str, np.ndarray] = {}
-    text = json.dumps(_storable(answer._asdict(), arrays))
-    with files.locked(path.parent, wait=True):  # another command may ask the same
-        files.write_arrays(path, arrays | {"json": np.frombuffer(text.encode(), np.uint8)})
-
-
-def _storable(value: Any, arrays: dict[str, np.ndarray]) -> Any:
-    """What JSON gives back as it was; of an array its name, under which it is put aside."""
-    if isinstance(value, np.generic) and value.dtype.kind in "biufU":
-        value = value.item()
-    kind = type(value)
-    if kind in (str, int, float, bool, type(None)):
-        return value
-    if kind in (list, tuple):
-        return [_storable(entry, arrays) for entry in value]
-    if kind is dict and ARRAY not in value and {*map(type, value)} <= {str}:
-        return {name: _storable(entry, arrays) for name, entry in value.items()}
-    if kind is np.ndarray and value.dtype.kind in "biufcSU":
-        name = f"array {len(arrays)}"
-        arrays[name] = value
-        return {ARRAY: name}
-    found = f"a {kind.__name__}"
-    if kind is dict:
-        found = f"a dict by {[*value]}"
-    elif kind is np.ndarray:
-        found = f"an array of {value.dtype}"
-    raise TypeError(f"an answer holds {found}; expected arrays and what JSON can hold")
-
-
 def _read_answer(path: Path) -> Result:
-    arrays = files.read_arrays(path, checked=True)
-
-    def resolve(value: dict) -> Any:
-        return arrays[value[ARRAY]] if ARRAY in value else value
-
     try:
-        return Result(**json.loads(arrays["json"].tobytes(), object_hook=resolve))
-    except Exception as error:  # another kind of file may hold anything
+        return Result(**files.read_nested(path))
+    except TypeError as error:
         raise ValueError(f"{path} holds no answer: {error!r}") from error
 
 

@@ -14,7 +14,7 @@ logging.getLogger("fontTools").setLevel(logging.ERROR)
 STYLE = Path(__file__).resolve().parent / "unload.mplstyle"
 # One colour, one meaning: what an agent sees or stores, or the rule that picks. Grey, dashed or
 # hollow is without the mask. "shuffled" and "positions" never meet in a notebook.
-# The colours of boxes stand in ``unload.load.picture``.
+# The colours of boxes stand in ``unload.drawing.picture``.
 COLOURS = {
     "ranks": "C1", "positions": "C0", "shuffled": "C0", "averaged": "C3", "level": "C2",
     "random": "C5", "highest": "C4", "nearest": "#8c564b",

@@ -17,9 +17,9 @@ from joblib import Parallel, delayed
 from tqdm import tqdm
 
 from studies.results import code_of, run_record
-from unload.agent.checkpoint import RunFolder
-from unload.agent.config import TrainConfig
+from unload.agent.config import TrainConfig, settings_of_run
 from unload.agent.training import Training, train
+from unload.checkpoint.folder import RunFolder
 from unload.support import files
 
 WINDOWS = os.name == "nt"
@@ -95,7 +95,8 @@ def _run(name: str, config: TrainConfig, folder: Path, change, code: str | None,
 
     try:
         # A finished run is only read, perhaps where nothing can be written.
-        log_path = os.devnull if RunFolder(folder).finished else folder / "log.txt"
+        finished = RunFolder(folder, settings_of_run(config, change=change)).finished
+        log_path = os.devnull if finished else folder / "log.txt"
         folder.mkdir(parents=True, exist_ok=True)
         if code is not None:
             _check_code(folder / "code.json", code)

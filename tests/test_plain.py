@@ -9,22 +9,24 @@ import pytest
 import torch
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
+from tests.env.comparing import few_items
 from unload import DQN, PEQNetwork, TrainConfig, plain, stack_load
 from unload.agent.training import Training
 
+WALL, FEW = partial(stack_load, walls=1), partial(few_items, count=6)  # the few are all unloaded
 SETTINGS = [
-    {"equalize": False},
-    {"replay_size": 100, "gamma": 0.9, "max_picks": 50},
-    {"mask": True, "gamma": 0.5, "max_picks": 50},
+    (WALL, {"equalize": False}),
+    (WALL, {"replay_size": 100, "gamma": 0.9, "max_picks": 50}),
+    (WALL, {"mask": True, "gamma": 0.5, "max_picks": 50}),
+    (FEW, {"mask": True, "gamma": 0.9}),
 ]
 
 
-@pytest.mark.parametrize("settings", SETTINGS, ids=str)
-def test_the_package_trains_as_the_page_does(settings):
-    """By bits, with loads of one wall, episodes that end, and a target that is renewed once."""
+@pytest.mark.parametrize(("stack", "settings"), SETTINGS)
+def test_the_package_trains_as_the_page_does(stack, settings):
+    """By bits, with episodes that end in either way, and a target that is renewed once."""
     size = {"num_envs": 4, "picks": 800, "batch_size": 16, "n_features": 4}
     config = TrainConfig(**size, target_update_interval=599, log_interval=1, **settings)
-    stack = partial(stack_load, walls=1)
 
     *seeds, weights_seed = config.seeds()
     network = PEQNetwork(config.n_features, torch.Generator().manual_seed(weights_seed))

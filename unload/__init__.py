@@ -20,14 +20,15 @@ if TYPE_CHECKING:  # what ``_PLACES`` says, for type checkers
     from unload.agent.greedy import Greedy as Greedy
     from unload.agent.greedy import load_policy as load_policy
     from unload.agent.greedy import save_policy as save_policy
+    from unload.agent.resume import check_resume as check_resume
     from unload.agent.training import train as train
+    from unload.drawing.view import view as view
     from unload.env.container import ContainerEnv as ContainerEnv
     from unload.env.equalization import equalize as equalize
     from unload.env.highest_item import HighestItemEnv as HighestItemEnv
     from unload.load.boxes import Load as Load
     from unload.load.substacks import build_load as build_load
     from unload.load.substacks import stack_load as stack_load
-    from unload.load.view import view as view
     from unload.network.peq import PEQNetwork as PEQNetwork
     from unload.orders.order import picking_order as picking_order
     from unload.orders.packing_list import read_load as read_load
@@ -42,6 +43,7 @@ _PLACES = {
     "PEQNetwork": "network.peq",
     "TrainConfig": "agent.config",
     "build_load": "load.substacks",
+    "check_resume": "agent.resume",
     "equalize": "env.equalization",
     "evaluate": "agent.evaluation",
     "load_policy": "agent.greedy",
@@ -52,7 +54,7 @@ _PLACES = {
     "stack_load": "load.substacks",
     "success_rate": "agent.evaluation",
     "train": "agent.training",
-    "view": "load.view",
+    "view": "drawing.view",
 }
 __all__ = ["__version__", *_PLACES]
 

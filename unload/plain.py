@@ -171,8 +171,8 @@ class HighestItem(Task):
 # (E, 128, 3) float32, masks (E, 128) bool or int8, and actions (E,) int64.
 def choose(network, observations, allowed, epsilon, rng):
     """Choose ε-greedily: by random scores or the network's, and never what the mask excludes."""
-    scores = np.empty(allowed.shape)
-    explore = rng.random(len(allowed)) < epsilon
+    scores = np.empty(allowed.shape)  # (E, 128)
+    explore = rng.random(len(allowed)) < epsilon  # (E,)
     scores[explore] = rng.random(scores[explore].shape)
     with torch.no_grad():
         scores[~explore] = network(torch.from_numpy(observations[~explore]))
@@ -182,12 +182,13 @@ def choose(network, observations, allowed, epsilon, rng):
 def update(network, target, optimizer, picks, gamma):
     """Bring the values of remembered picks nearer to their targets; return the loss."""
     columns = (torch.from_numpy(np.array(column)) for column in zip(*picks))
-    before, chosen, reward, after, free, ended = columns
+    before, chosen, reward, after, free, ended = columns  # (batch, ...) each
     with torch.no_grad():
-        best = target(after).masked_fill(~free, -torch.inf).amax(dim=1)
-    goal = reward + gamma * best.masked_fill(ended, 0)  # in an empty container nothing follows
-    values = network(before).gather(1, chosen[:, None])[:, 0]
-    loss = smooth_l1_loss(values, goal)
+        following = target(after).masked_fill(~free, -torch.inf)  # (batch, 128)
+    best = following.amax(dim=1).masked_fill(ended, 0)  # (batch,); of an empty container nothing
+    goal = reward + gamma * best  # (batch,)
+    values = network(before).gather(1, chosen[:, None])[:, 0]  # (batch, 128) -> (batch,)
+    loss = smooth_l1_loss(values, goal)  # ()
     optimizer.zero_grad()
     loss.backward()
     optimizer.step()
@@ -196,14 +197,14 @@ def update(network, target, optimizer, picks, gamma):
 
 def pick(choose, envs, network, seen, epsilon, mask, rng):
     """Pick once in each environment; return what is remembered of each, and what is seen next."""
-    observations, infos = seen
-    allowed = infos["action_mask" if mask else "item_mask"].astype(bool)
-    actions = choose(network, observations, allowed, epsilon, rng)
-    following, rewards, ended, _, infos = envs.step(actions)
+    observations, infos = seen  # (E, 128, 3)
+    allowed = infos["action_mask" if mask else "item_mask"].astype(bool)  # (E, 128)
+    actions = choose(network, observations, allowed, epsilon, rng)  # (E,)
+    following, rewards, ended, _, infos = envs.step(actions)  # (E, 128, 3), (E,), (E,)
 
     # Where an episode has ended, Gymnasium has begun the next one already. What was seen last in
     # the old one stands in ``final_obs`` and ``final_info``, and belongs to the pick.
-    after, free = following.copy(), infos["action_mask"].astype(bool)
+    after, free = following.copy(), infos["action_mask"].astype(bool)  # (E, 128, 3), (E, 128)
     for env in np.flatnonzero(infos.get("_final_obs", [])):
         after[env] = infos["final_obs"][env]
         free[env] = infos["final_info"]["action_mask"][env]

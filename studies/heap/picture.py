@@ -9,7 +9,7 @@ from matplotlib.path import Path
 
 from studies.heap.boxes import FARTHEST_EDGE, REAR, WIDTH, Heap
 from studies.heap.rake import Outcome
-from unload.load.picture import COLOURS, CORNERS, EYE, SEAM, project
+from unload.drawing.picture import COLOURS, CORNERS, EYE, SEAM, project
 
 # What happens to a box in a pick, and its colour. The later ones win.
 MEANINGS = {

@@ -15,7 +15,7 @@ import unload
 from studies.policies.comparison import front_walls
 from studies.style import styled
 from unload import task
-from unload.load.picture import COLOURS
+from unload.drawing.picture import COLOURS
 from unload.physics.bullet import TIME_STEP, World, slim
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import RESOLUTION, Situation

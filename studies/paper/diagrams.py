@@ -15,7 +15,7 @@ from matplotlib.patches import FancyBboxPatch, Rectangle
 
 from studies.style import styled
 from unload import task
-from unload.load.picture import package_colour, snapshot
+from unload.drawing.picture import package_colour, snapshot
 from unload.load.substacks import (
     CELL,
     CELLS_HIGH,

@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 
 from studies.play.episode import Run, policy_of
 from unload.agent.greedy import Greedy, greedy_actions
+from unload.drawing.picture import COLOURS, back_to_front, corners, draw
 from unload.env.equalization import equalize
 from unload.env.observation import POSITION_NOISE, drift, scale
-from unload.load.picture import COLOURS, back_to_front, corners, draw
 
 HEIGHT = 2  # column of the ranks along z
 RANKS = plt.get_cmap("viridis_r")  # dark is high

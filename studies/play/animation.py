@@ -13,7 +13,7 @@ from studies.play.episode import Run
 from studies.style import styled
 from unload import task
 from unload.agent.evaluation import Policy
-from unload.load.picture import COLOURS, back_to_front, corners, draw, pixels
+from unload.drawing.picture import COLOURS, back_to_front, corners, draw, pixels
 from unload.support import files
 
 WIDTH, HEIGHT = 4.4, 4.4  # of one agent's part, in inches at 100 pixels each

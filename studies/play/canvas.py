@@ -13,8 +13,8 @@ import numpy as np
 import traitlets
 
 from unload import task
+from unload.drawing.picture import TARGET
 from unload.load.boxes import Load
-from unload.load.picture import TARGET
 
 ABSENT = 255  # colour number of a box that is not drawn
 Colour = tuple[float, float, float]

@@ -63,7 +63,7 @@ class Moment:
     pick: Pick | None
 
     def groups(self) -> dict[str, np.ndarray]:
-        """Items by the names of ``unload.load.picture.COLOURS``, the later name holds."""
+        """Items by the names of ``unload.drawing.picture.COLOURS``, the later name holds."""
         groups = {"visible": self.visible, "tried": self.failed}
         if self.pick is not None and not self.pick.success:
             groups["failed"] = np.array([self.pick.item])

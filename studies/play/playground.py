@@ -13,9 +13,9 @@ from studies.play.episode import PLAYERS, Episode, Moment, Run, explain
 from studies.play.replay import replay
 from unload import task
 from unload.agent.evaluation import Policy
-from unload.load.picture import COLOURS
+from unload.drawing.picture import COLOURS
+from unload.drawing.view import view
 from unload.load.substacks import stack_load
-from unload.load.view import view
 from unload.support import checks
 
 YOU, TRAINED = "you", "your agent"

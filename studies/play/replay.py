@@ -6,9 +6,9 @@ import numpy as np
 import plotly.graph_objects as go
 
 from studies.play.episode import Episode, Pick
+from unload.drawing.picture import COLOURS
+from unload.drawing.view import View, layout, mesh, view
 from unload.load.boxes import Load
-from unload.load.picture import COLOURS
-from unload.load.view import View, layout, mesh, view
 
 STOPS = 24  # of the slider, at most
 EARLY, LATE = np.array((0.00, 0.30, 0.25)), np.array((0.70, 0.93, 0.85))  # what is unloaded

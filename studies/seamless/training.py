@@ -18,8 +18,8 @@ from studies.grid import Cell, Grid, cell, train_grid
 from studies.results import COMMAND, read_table, write_table
 from studies.seamless.jamming import jam, jam_by_place, weigh
 from unload import task
-from unload.agent.checkpoint import RunFolder, settings_of_run
 from unload.agent.config import TrainConfig
+from unload.agent.training import finished_run
 
 SHARE = 0.4  # j; the paper's start of 15 % and end of 60 % need about so much
 FIRST_SEED = 40
@@ -78,8 +78,7 @@ def seamless_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
     name, seed = EXPORTED
     if cells is None or name in cells:
         config, change = replace(CELLS[name].config, seed=seed), CELLS[name].change
-        settings = settings_of_run(config, change=change)
-        run = RunFolder(kept / f"{name}/seed_{seed}").result(config, settings)
+        run = finished_run(kept / f"{name}/seed_{seed}", config, change)
         export(run.curve["wall_time"])
 
 

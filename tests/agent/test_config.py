@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from unload import ContainerEnv, HighestItemEnv, TrainConfig, train
-from unload.agent.config import ENVS, EXPLORATION_FRACTION, plain
+from unload import ContainerEnv, TrainConfig, train
+from unload.agent.config import ENVS, EXPLORATION_FRACTION
 from unload.env.vector import ContainerVectorEnv
 
 
@@ -35,6 +35,12 @@ def test_epsilon_falls_linearly_and_stays():
     config = TrainConfig(picks=6400, epsilon_init=0.9, epsilon_final=0.1)
     values = [config.epsilon(picks) for picks in (0, 1600, 3200, 3201, 6400)]
     assert values == pytest.approx([0.9, 0.5, 0.1, 0.1, 0.1])
+
+
+def test_a_run_draws_other_loads_than_an_evaluation_of_its_seed():
+    seeds = TrainConfig(seed=3).seeds()
+    assert len({*seeds}) == 3 and not {*seeds} & {*TrainConfig(seed=4).seeds()}
+    assert not {*seeds} & {*np.random.SeedSequence(3).generate_state(3).tolist()}
 
 
 COUNTS = ("picks", "num_envs", "batch_size", "n_features", "target_update_interval", "max_picks")
@@ -123,22 +129,3 @@ def test_the_physics_in_the_docstring_trains(full_load, tmp_path, monkeypatch):
     free = ~full_load.covered(np.ones(len(full_load), bool))[envs.visible[1]]
     wide = full_load.sizes[envs.visible[1], 1] > 0.4 + 1e-6
     assert np.array_equal(envs.liftable()[1], free & ~wide) and (free & wide).any()
-
-
-def test_functions_are_known_by_their_names_and_the_arguments_of_a_partial():
-    bound = partial(train, "config", sizes=np.array([1, 2]), limits=(np.inf, -0.0), by={3: train})
-    assert plain({"change": bound, "network": HighestItemEnv, "other": len}) == {
-        "change": {
-            "function": "unload.agent.training.train",
-            "arguments": ["config"],
-            "keywords": {
-                "sizes": [1, 2],
-                "limits": ["inf", 0.0],
-                "by": {"3": "unload.agent.training.train"},
-            },
-        },
-        "network": "unload.env.highest_item.HighestItemEnv",
-        "other": "builtins.len",
-    }
-    with pytest.raises(TypeError, match="known by its arguments, and one is .*; expected numbers"):
-        plain(partial(train, {1}))

@@ -1,3 +1,6 @@
+from copy import deepcopy
+from itertools import count
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -23,6 +26,27 @@ def test_one_row_per_episode():
     assert list(frame.columns) == COLUMNS and len(frame) == 20 and not frame.equals(other)
     assert (40 * frame["success_rate"]).tolist() == pytest.approx(frame["unloaded"].tolist())
     assert frame["success_rate"].between(0.05, 0.7).all()
+
+
+def test_an_episode_is_the_same_whatever_is_played_beside_it():
+    """Also of a policy that draws, from a generator that is not the load's."""
+    loads, drawn = [], []
+
+    def stack(rng):
+        loads.append(deepcopy(rng).random())
+        return few_items(rng, 200)
+
+    def noted(observations, masks, rng):
+        drawn.append(deepcopy(rng).random())
+        return policies.random(observations, masks, rng)
+
+    few = {"max_picks": 20, "stack": stack}
+    many, alone = (evaluate(noted, count, 7, **few) for count in (70, 1))
+    local = evaluate(noted, 2, 7, physics="local", **few)
+    pd.testing.assert_frame_equal(many.loc[:0], alone)
+    pd.testing.assert_frame_equal(many.loc[:1], local)
+    assert many["unloaded"].nunique() > 3
+    assert not {*loads} & {*drawn}
 
 
 def test_the_longest_deadlock_is_the_longest_and_not_the_sum():
@@ -73,6 +97,22 @@ def test_an_episode_is_given_up_1280_failures_after_its_last_success():
     frame = evaluate(policy, 1, mask=False, max_picks=None, stack=lambda rng: few_items(rng, 40))
     assert left.count(left[-1]) == 1280 < len(left) == frame["picks"].item()
     assert frame["longest_deadlock"].item() == 1279 and not frame["emptied"].item()
+
+
+def test_what_follows_an_episode_that_was_given_up_does_not_count():
+    """The first one picks what fails; and empties its container while the second one goes on."""
+    calls, sizes = count(), iter([40, 800])
+
+    def policy(observations, masks, rng):
+        call = next(calls)
+        low, high = (rule(observations, masks, rng) for rule in (lowest, policies.highest))
+        return np.where([call < 1290, call % 2], low, high)
+
+    frame = evaluate(
+        policy, 2, mask=False, max_picks=None, stack=lambda rng: few_items(rng, next(sizes, 40))
+    )
+    assert frame["emptied"].tolist() == [False, True]
+    assert frame["picks"].iloc[1] > 1290 + 40 and frame["unloaded"].iloc[0] < 40
 
 
 @pytest.mark.parametrize("max_picks", [200, None])

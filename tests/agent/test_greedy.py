@@ -7,7 +7,7 @@ from unload import Greedy, equalize, load_policy, save_policy
 from unload.agent.greedy import greedy_actions, settings_of
 from unload.agent.learner import best_actions
 from unload.network.weights import write_weights
-from unload.task import VERSION
+from unload.task import PADDING, VERSION
 
 
 @pytest.fixture
@@ -23,6 +23,20 @@ def test_greedy_equalizes_what_its_network_expects(observations, rng, ties):
     assert (policy(observations, masks, rng) == greedy_actions(peq(), seen, masks)).all()
     with pytest.raises(ValueError, match="observations"):
         policy(observations[0], masks[:1], rng)
+
+
+@pytest.mark.parametrize("ties", ["noise", "average"])
+def test_padded_rows_change_no_choice(observations, rng, ties):
+    """Of ranks and of a network that pools over all rows: a container with few boxes is padded."""
+    network = HeightNetwork(-1.0)  # whose fused twin there is not
+    network.forward = lambda seen, present=None: -seen[..., 2] * (seen[..., 0] - 0.1)
+    padded = np.concatenate([observations, np.full((40, 7, 3), PADDING, np.float32)], axis=1)
+    masks = np.ones(padded.shape[:2])
+    masks[:, 25:] = 0
+    policy = Greedy(network, True, ties)
+    chosen = policy(padded, masks, rng)
+    assert np.array_equal(chosen, policy(observations, masks[:, :25], rng))
+    assert len({*chosen}) > 5
 
 
 @pytest.mark.parametrize("value", [torch.nan, torch.inf])

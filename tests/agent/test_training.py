@@ -12,9 +12,10 @@ import torch
 from tests.agent import runs
 from tests.agent.runs import CONTAINER, RUNS, HeightNetwork, assert_same, at_step, interrupt, metres
 from unload import TrainConfig, evaluate, load_policy, train
-from unload.agent.checkpoint import RunFolder
 from unload.agent.curve import Curve, Point
+from unload.agent.rollout import Rollout
 from unload.agent.training import Training, warn_of_other_bits
+from unload.checkpoint.folder import RunFolder
 from unload.env.vector import ContainerVectorEnv
 from unload.support import files
 
@@ -136,8 +137,8 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, monke
         train(config, tmp_path, progress=False)
     left = {"checkpoint.npz", "curve.csv", "lock"}
     assert {path.name for path in tmp_path.iterdir()} <= left
-    stored = files.read_arrays(tmp_path / "checkpoint.npz")
-    assert all(np.isfinite(array).all() for name, array in stored.items() if "network" in name)
+    stored = files.read_nested(tmp_path / "checkpoint.npz")["run"]["agent"]["network"]
+    assert all(np.isfinite(weights).all() for weights in stored.values())
 
 
 @pytest.mark.parametrize(
@@ -248,6 +249,20 @@ def test_a_container_in_which_every_item_has_failed_is_played_to_its_end(
         run.step()
     assert run.curve.table()["success_rate"].eq(0).all()
     assert not run.replay.arrays.get("next_masks", np.zeros((1, 4)))[:, 3:].any()
+
+
+def test_the_last_pick_of_an_episode_leads_to_its_own_end(boxes, monkeypatch):
+    """Where all boxes have failed, and not to the next container, which holds more."""
+    look_up = ContainerVectorEnv._lift
+    monkeypatch.setattr(ContainerVectorEnv, "_lift", lambda *each: (look_up(*each)[0], np.zeros(1)))
+    loads = iter([boxes((0.4, 0.2), (1.2, 0.2)), boxes((0.4, 0.2), (1.2, 0.2), (2.0, 0.2))])
+    config = TrainConfig(**CONTAINER | {"num_envs": 1, "gamma": 0.9, "max_picks": 2})
+    rollout = Rollout(config, stack=lambda rng: next(loads))
+    rollout.pick(np.array([0]))
+    picks, _ = rollout.pick(np.array([1]))
+    assert np.flatnonzero(picks["next_masks"]).tolist() == [0, 1]
+    assert np.array_equal(picks["next_observations"], picks["observations"])
+    assert rollout.allowed.sum() == 3
 
 
 @pytest.mark.parametrize(("found", "count"), [("DEFAULT", 1), ("AVX2", 0), ("AVX512", 0)])

@@ -9,10 +9,10 @@ from gymnasium.utils.env_checker import check_env
 
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, few_items, make_env
 from unload import ContainerEnv, plain
+from unload.drawing.picture import snapshot
 from unload.env import observation
 from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import CONTACT_TOLERANCE
-from unload.load.picture import snapshot
 from unload.load.substacks import build_load
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics

@@ -10,8 +10,10 @@ import pytest
 import torch
 from torch.nn.functional import smooth_l1_loss
 
-from tests.agent.runs import Subclass, make_batch, peq, without_next
+from tests.agent.runs import CONTAINER, Subclass, make_batch, peq, without_next
+from unload import TrainConfig
 from unload.agent.dqn import DQN
+from unload.agent.training import Training
 from unload.fast import fused
 from unload.fast.learner import FusedLearner
 from unload.network.peq import PEQNetwork
@@ -165,3 +167,13 @@ def test_steps_are_those_of_pytorch(rng, learning_rate):
     after = flat(ours)
     assert np.abs(after - flat(theirs)).max() < 1e-5 < np.abs(after - before).max()
     assert after[3] == before[3]
+
+
+def test_it_is_the_one_in_use(monkeypatch, rng):
+    """In training and by a trained policy; PyTorch, some sixty times slower, is not asked."""
+    run = Training(TrainConfig(**CONTAINER))
+    monkeypatch.setattr(PEQNetwork, "forward", lambda *_: pytest.fail("PyTorch is asked"))
+    for _ in range(10):
+        run.step()
+    assert run.agent.learner.steps > 0
+    run.policy()(run.rollout.observations, run.rollout.allowed, rng)

@@ -163,3 +163,17 @@ def test_a_function_of_other_arguments_is_refused_by_name(network):
     message = "network is <.*; expected a function of n_features and a generator"
     with pytest.raises(TypeError, match=message):
         make_network(network, 4)
+
+
+def test_a_network_is_tried_in_a_copy():
+    """It may count its calls, and begins in the mode for training."""
+
+    class Counting(PEQNetwork):
+        calls = 0
+
+        def forward(self, observations, present=None):
+            self.calls += 1
+            return super().forward(observations, present)
+
+    made = make_network(Counting, 4)
+    assert made.training and made.calls == 0

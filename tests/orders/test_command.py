@@ -118,7 +118,7 @@ def test_nothing_is_written_before_all_can_be(tmp_path, capsys, monkeypatch):
     assert folder in refused(capsys, boxes, "--output", below, "--picture", picture)
     assert folder in refused(capsys, boxes, "--output", order, "--picture", below)
     monkeypatch.setitem(sys.modules, "matplotlib", None)  # as if it were not installed
-    for module in [name for name in sys.modules if name.startswith("unload.load.picture")]:
+    for module in [name for name in sys.modules if name.startswith("unload.drawing.picture")]:
         monkeypatch.delitem(sys.modules, module)
     said = refused(capsys, boxes, "--output", order, "--picture", picture)
     assert "--picture needs matplotlib, which is not installed; expected it: pip" in said

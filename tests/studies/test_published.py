@@ -30,7 +30,7 @@ from studies.ties.criterion import READINGS, likeness, noisier_readings
 from studies.ties.training import TIES
 from tests.test_notebooks import cells as cells_in
 from tests.test_notebooks import text as text_of
-from unload.load.view import _PLOTLY_MIMETYPE
+from unload.drawing.view import _PLOTLY_MIMETYPE
 
 SIMULATED = {"fig02_containers"}  # the one figure for which boxes are moved
 # The cells, by their ids, that draw the other figures from data/, and some whose figures stand in

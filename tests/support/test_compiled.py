@@ -2,8 +2,12 @@
 
 import re
 import shutil
+import sys
 from functools import partial
 from pathlib import Path
+
+import numba
+import numpy as np
 
 import unload
 from unload.support import compiled
@@ -41,6 +45,15 @@ def test_code_is_compiled_once_for_each_value_of_a_constant(tmp_path, run_python
     assert printed == "0.6 0\n" and "compiling" in said
     (package / "task.py").write_text(constants, encoding="utf-8")
     assert run() == ("0.3 1\n", "")
+
+
+def test_each_version_of_python_and_its_libraries_has_code_of_its_own(monkeypatch):
+    found = {compiled._digest(PACKAGE)}
+    for owner, name in ((sys, "version"), (np, "__version__"), (numba, "__version__")):
+        with monkeypatch.context() as other:
+            other.setattr(owner, name, "another")
+            found.add(compiled._digest(PACKAGE))
+    assert len(found) == 4
 
 
 def test_all_that_compiled_functions_read_is_among_the_sources():

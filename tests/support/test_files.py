@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 import time
+from collections import OrderedDict
 from io import BytesIO
 from pathlib import Path
 
@@ -60,6 +61,58 @@ def test_arrays_come_back_as_they_were_or_are_refused_by_name(tmp_path, rng):
     assert contents(files.read_arrays(path)) == contents(ARRAYS)
     with pytest.raises(ValueError, match="arrays.npz was changed or damaged: .*, expected None"):
         files.read_arrays(path, checked=True)
+
+
+def test_nested_values_come_back_as_they_were(tmp_path):
+    """In tuples as in lists; NumPy's scalars are Python's then."""
+    path, whole, zero = tmp_path / "nested.npz", 2**127, np.zeros((2, 0), np.float32)
+    rows = [{"item": np.int64(3), "free": np.True_, "by": np.str_("a"), "fell": float("nan")}]
+    text, flat = np.array(["a", "bc"]), np.arange(3, dtype=np.int8)
+    files.write_nested(path, {"rows": rows, "of": (0.1 + 0.2, whole, None, flat, zero, text)})
+    found = files.read_nested(path)
+    assert str(found["rows"]) == "[{'item': 3, 'free': True, 'by': 'a', 'fell': nan}]"
+    assert found["of"][:3] == [0.1 + 0.2, whole, None]
+    for array, wanted in zip(found["of"][3:], (flat, zero, text), strict=True):
+        assert array.dtype == wanted.dtype and np.array_equal(array, wanted)
+
+
+@pytest.mark.parametrize(
+    ("value", "found"),
+    [
+        ({1, 2}, "a set"),
+        (OrderedDict(a=1), "a OrderedDict"),
+        (np.timedelta64(1, "ns"), "a timedelta64"),
+        ({"a": 1, 2: 1}, r"a dict by \['a', 2\]"),
+        ({True: 1}, r"a dict by \[True\]"),
+        ({None: 1}, r"a dict by \[None\]"),
+        ({files.ARRAY: "array 0"}, rf"a dict by \['{files.ARRAY}'\]"),
+        (np.ma.array([1, 2], mask=[0, 1]), "a MaskedArray"),
+        (np.zeros(2, "M8[s]"), r"an array of datetime64\[s\]"),
+        (np.array([1, None]), "an array of object"),
+        (np.array(["a"], np.dtypes.StringDType()), r"an array of StringDType\(\)"),
+    ],
+)
+def test_what_would_not_be_read_back_as_it_was_is_refused_by_its_place(tmp_path, value, found):
+    with pytest.raises(TypeError, match=f"^rows.1 is {found}; expected arrays and what JSON can"):
+        files.write_nested(tmp_path / "nested.npz", {"rows": [0, value]})
+    with pytest.raises(TypeError, match=f"^the whole is {found}; expected"):
+        files.write_nested(tmp_path / "nested.npz", value)
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("other", "{}"),
+        ("json", "[" * 100_000),
+        ("json", f'{{"{files.ARRAY}": "missing"}}'),
+        ("json", f'{{"{files.ARRAY}": []}}'),
+    ],
+)
+def test_a_whole_file_without_nested_values_is_refused(tmp_path, name, text):
+    files.write_arrays(tmp_path / "x.npz", {name: np.frombuffer(text.encode(), np.uint8)})
+    with pytest.raises(ValueError, match="x.npz holds no nested values: (KeyE|Recu|Type)"):
+        files.read_nested(tmp_path / "x.npz")
 
 
 def test_json_has_a_digest_where_it_is_wanted(tmp_path):

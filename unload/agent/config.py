@@ -2,16 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from functools import partial
-from typing import Any
 
 import gymnasium
 import numpy as np
 
 from unload import task
+from unload.checkpoint.settings import plain
 from unload.env.equalization import TIES
 from unload.env.observation import MOST_NOISE, POSITION_NOISE
 from unload.network.factory import NETWORKS
+from unload.physics.bullet import ENGINES, engine_of
 from unload.support import checks
 
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
@@ -25,34 +25,6 @@ UPPER_LIMITS = {
 }  # fmt: skip
 # K_ε / K, the share of the picks over which exploration falls (Sec. IV-B).
 EXPLORATION_FRACTION = 0.5
-
-
-def plain(value: Any) -> Any:
-    """Return a value as JSON can hold it: a function by its qualified name.
-
-    A ``partial`` is its function and its arguments, a callable object the name of its type.
-
-    Raises:
-        TypeError: it holds something else.
-    """
-    if isinstance(value, partial):
-        parts = {"function": value.func, "arguments": value.args, "keywords": value.keywords}
-        return plain(parts)
-    if isinstance(value, dict):
-        return {str(name): plain(entry) for name, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(entry) for entry in value]
-    if isinstance(value, (np.ndarray, np.generic)):
-        return plain(value.tolist())
-    if isinstance(value, float) and not np.isfinite(value):
-        return str(value)  # which strict JSON has no number for
-    if value is None or isinstance(value, (bool, int, float, str)):
-        return value
-    if not callable(value):
-        wanted = "expected numbers, texts, arrays, functions, and lists and dicts of these"
-        raise TypeError(f"a run is known by its arguments, and one is {value!r}; {wanted}")
-    named = value if hasattr(value, "__qualname__") else type(value)
-    return f"{named.__module__}.{named.__qualname__}"
 
 
 def _registered(env: object) -> str:
@@ -169,3 +141,15 @@ class TrainConfig:
         The spawn key gives other loads than ``unload.evaluate`` draws with the same seed.
         """
         return tuple(np.random.SeedSequence(self.seed, spawn_key=(1,)).generate_state(3).tolist())
+
+
+def settings_of_run(
+    config: TrainConfig, stack: Callable | None = None, change: Callable | None = None
+) -> dict:
+    """What a run is: its configuration, and the names of its change and stack, None without.
+
+    Also the engine, if it is not PyBullet.
+    """
+    own = plain({"change": change, "stack": stack})
+    other = {"engine": engine_of()} if engine_of() != ENGINES[0] and config.env != ENVS[1] else {}
+    return config.plain() | own | other

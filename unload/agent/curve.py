@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -72,13 +72,15 @@ class Curve:
         """Return one row per point."""
         return pd.DataFrame(self.points, columns=Point._fields)
 
-    def state(self) -> dict[str, np.ndarray]:
-        """Return points and sums, for a checkpoint."""
-        points = np.array(self.points, np.float64).reshape(-1, len(Point._fields))
-        return {"points": points, "sums": np.array([*self.sums.values()], np.float64)}
+    def csv(self) -> str:
+        """Return the table as CSV."""
+        return self.table().to_csv(index=False, lineterminator="\n")
 
-    def load_state(self, arrays: dict[str, np.ndarray]) -> None:
-        """Take back what ``state`` returned."""
-        points = arrays["points"].tolist()
-        self.points = [Point(int(picks), *rest) for picks, *rest in points]
-        self.sums = dict(zip(SUMS, arrays["sums"].tolist(), strict=True))
+    def state_dict(self) -> dict[str, Any]:
+        """Return points and sums, for a checkpoint."""
+        return {"points": [tuple(point) for point in self.points], "sums": self.sums}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Take back what ``state_dict`` returned."""
+        self.points = [Point(*point) for point in state["points"]]
+        self.sums = state["sums"]

@@ -10,6 +10,7 @@ from unload.agent.learner import PlainLearner
 from unload.agent.policies import any_allowed
 from unload.fast import fused
 from unload.fast.learner import FusedLearner
+from unload.network.weights import as_arrays, as_tensors
 from unload.support import checks
 
 
@@ -153,6 +154,17 @@ class DQN:
         best = values.masked_fill(torch.from_numpy(~batch["next_masks"]), -torch.inf).amax(dim=1)
         best = best.masked_fill(torch.from_numpy(batch["terminations"]), 0)
         return (torch.from_numpy(batch["rewards"]) + self.gamma * best).numpy()
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return both networks' weights and the learner's state, as arrays, for a checkpoint."""
+        weights = {"network": self.network.state_dict(), "target": self.target}
+        return as_arrays(weights) | {"learner": self.learner.state_dict()}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Take back what ``state_dict`` returned."""
+        self.network.load_state_dict(as_tensors(state["network"]))
+        self.target = as_tensors(state["target"])
+        self.learner.load_state_dict(state["learner"])
 
     def update_target(self) -> None:
         """Copy the network's weights to the target network."""

@@ -61,8 +61,9 @@ def evaluate(
     Args:
         policy: see ``unload.policies``.
         episodes: number of containers.
-        seed: of the loads and of the policy's random numbers; load i is the same whatever
-            the number of episodes.
+        seed: of the loads and of the policy's random numbers. Episode i is the same whatever their
+            number, the physics, and how many are played at once: a policy that draws is asked
+            about one episode at a time, each with a generator of its own.
         physics: see ``ContainerEnv``. ``"table"`` plays 64 episodes side by side, the others
             one after the other; one of your own is not closed.
         mask: whether the policy's masks exclude items that failed since the last success.
@@ -114,11 +115,36 @@ def evaluate(
     return table if max_picks is None else table.drop(columns=["picks", "emptied"])
 
 
+class _Chooser:
+    """Asks a policy about all episodes at once, or one by one as soon as it draws."""
+
+    def __init__(self, policy: Policy, seeds: list[int]) -> None:
+        self._policy = policy
+        # Not the numbers that the load of the same seed is made of.
+        self._rngs = [np.random.default_rng((seed, 1)) for seed in seeds]
+        self._shared = np.random.default_rng(0)
+        self._untouched = self._shared.bit_generator.state
+
+    def __call__(self, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+        if self._shared.bit_generator.state == self._untouched:
+            actions = self._ask(observations, allowed, self._shared)
+            if self._shared.bit_generator.state == self._untouched:
+                return actions
+        parts = zip(np.split(observations, len(allowed)), np.split(allowed, len(allowed)))
+        asked = [self._ask(*part, rng) for part, rng in zip(parts, self._rngs)]
+        return np.concatenate(asked)
+
+    def _ask(self, observations, allowed, rng) -> np.ndarray:
+        """What the policy returns is checked before anything is picked: it may be anybody's."""
+        actions, last = self._policy(observations, allowed, rng), task.N_VISIBLE - 1
+        return checks.integer_array("what policy returned", actions, (len(allowed),), last)
+
+
 def _play(
     envs: VectorEnv, policy: Policy, seeds: list[int], mask: bool, give_up: bool
 ) -> pd.DataFrame:
     """One episode in each environment; what follows after its end does not count."""
-    rng = np.random.default_rng(seeds)
+    choose = _Chooser(policy, seeds)
     rows = np.arange(len(seeds))
     rewards, deadlocked = [], []  # of each step, (num_envs,)
     running, emptied = np.ones(len(seeds), bool), np.zeros(len(seeds), bool)
@@ -132,11 +158,8 @@ def _play(
         if not running.any():
             break
 
-        # A policy needs a choice in every row, also where the episode is over; what it returns
-        # is checked before anything is picked, because it may be anybody's.
-        allowed = choosable(allowed, infos["item_mask"])
-        chosen, last = policy(observations, allowed, rng), task.N_VISIBLE - 1
-        actions = checks.integer_array("what policy returned", chosen, rows.shape, last)
+        # A policy needs a choice in every row, also where the episode is over.
+        actions = choose(observations, choosable(allowed, infos["item_mask"]))
 
         # The masks of before the pick say whether its item had failed already.
         deadlocked.append(infos["action_mask"][rows, actions] == 0)

@@ -6,10 +6,13 @@ network on a CPU, some sixty times faster on one core; a test holds the two equa
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 import torch
 from torch.nn.functional import smooth_l1_loss
+
+from unload.network.weights import as_arrays, as_tensors
 
 # Rows of a batch per backward pass, because what a pass stores then stays in the cache.
 ROWS_PER_PASS = 64
@@ -27,13 +30,20 @@ class PlainLearner:
     def __init__(self, network: torch.nn.Module, learning_rate: float, beta: float) -> None:
         self.network, self.beta = network, beta
         self.optimizer = torch.optim.Adam(network.parameters(), learning_rate)
-        # A step with zero gradients makes Adam's moments, so that a checkpoint before the first
-        # update has them, too.
-        for weight in network.parameters():
-            weight.grad = torch.zeros_like(weight)
-        self.optimizer.step()
-        for moments in self.optimizer.state.values():
-            moments["step"].zero_()
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return the optimizer's state, with arrays for tensors, for a checkpoint."""
+        return as_arrays(self.optimizer.state_dict())
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Take back what ``state_dict`` returned."""
+        moments = {int(number): as_tensors(each) for number, each in state["state"].items()}
+        groups = self.optimizer.param_groups
+        self.optimizer.load_state_dict(as_tensors(state) | {"state": moments})
+        # Settings are put back in place, because what changes a learning rate may hold them.
+        for group, loaded in zip(groups, self.optimizer.param_groups):
+            group |= loaded
+        self.optimizer.param_groups = groups
 
     def best_actions(self, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
         """Return the allowed action of the highest value, (batch,) int64."""

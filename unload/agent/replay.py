@@ -1,5 +1,7 @@
 """Memory of past picks to learn from."""
 
+from typing import Any
+
 import numpy as np
 
 
@@ -47,3 +49,14 @@ class ReplayBuffer:
         for name, array in self.arrays.items():
             array[slots] = batch[name]
         self.total += count
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return what is filled of the arrays, without a copy, for a checkpoint."""
+        arrays = {name: array[: len(self)] for name, array in self.arrays.items()}
+        return {"total": self.total, "arrays": arrays}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Take back what ``state_dict`` returned."""
+        self.total = state["total"]
+        for name, array in self.arrays.items():
+            array[: len(self)] = state["arrays"][name]

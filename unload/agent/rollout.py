@@ -108,6 +108,18 @@ class Rollout:
         self._observe(following, infos)
         return picks, distances
 
+    def state_dict(self) -> dict[str, Any]:
+        """Return what a checkpoint keeps: the environments' state, and what is seen of them."""
+        infos = {"action_mask": self.masks, "item_mask": self._present}
+        seen = {"observations": self.observations, "infos": infos}
+        return {"steps": self.steps, "envs": self.envs.state_dict(), **seen}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Take back what ``state_dict`` returned."""
+        self.steps = state["steps"]
+        self.envs.load_state_dict(state["envs"])
+        self._observe(state["observations"], state["infos"])
+
     def close(self) -> None:
         """Free the environments."""
         self.envs.close()

@@ -10,20 +10,21 @@ from contextlib import contextmanager
 from copy import deepcopy
 from functools import cache
 from pathlib import Path
-from typing import TextIO
+from typing import Any, NamedTuple, TextIO
 
 import numpy as np
+import pandas as pd
 import torch
 from tqdm import tqdm
 
 from unload import task
-from unload.agent.checkpoint import RunFolder, TrainResult, settings_of_run
-from unload.agent.config import ENVS, TrainConfig
+from unload.agent.config import ENVS, TrainConfig, settings_of_run
 from unload.agent.curve import Curve
 from unload.agent.dqn import DQN
-from unload.agent.greedy import Greedy
+from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
+from unload.checkpoint.folder import RunFolder
 from unload.load.boxes import Load, check_stack
 from unload.network.factory import make_network
 from unload.support import checks, files
@@ -32,6 +33,23 @@ CHECKPOINT_INTERVAL = 600.0  # seconds between two of them
 CURVE_INTERVAL = 1.0  # seconds between two versions of it on disk
 # PyTorch draws first weights otherwise without these instructions; with either, all bits agree.
 INSTRUCTIONS = ("AVX2", "AVX512")
+
+
+class TrainResult(NamedTuple):
+    """Policy and learning curve of a finished run.
+
+    Attributes:
+        policy: the trained network, as a greedy policy.
+        curve: one row per ``unload.agent.curve.Point``, whose attributes are the columns.
+    """
+
+    policy: Greedy
+    curve: pd.DataFrame
+
+    def __repr__(self) -> str:
+        end = self.curve.iloc[-1]
+        said = f"{end['picks']:,.0f} picks, MSR {100 * end['success_rate']:.1f} % at the end"
+        return f"TrainResult({self.policy!r}, curve of {len(self.curve)} points: {said})"
 
 
 @cache  # once; Python's own filter forgets where another module changes filters
@@ -62,6 +80,8 @@ class Training:
         rng: draws exploration and batches.
         kept: arrays that a change adds to the checkpoints, by name.
     """
+
+    PARTS = ("rollout", "agent", "replay", "curve")  # that have a state of their own
 
     def __init__(
         self,
@@ -127,6 +147,31 @@ class Training:
         rows = self.rng.integers(len(self.replay), size=self.config.batch_size)
         return self.agent.start_update(self.replay.arrays, rows)
 
+    def state_dict(self) -> dict[str, Any]:
+        """Return what a checkpoint keeps: arrays, not copied, and what JSON can hold.
+
+        PyTorch's global generator is a part of it, because dropout draws from it.
+        """
+        for name, array in self.kept.items():
+            checks.instance(f"run.kept[{name!r}]", array, np.ndarray, "a NumPy array")
+        own = {"torch": torch.get_rng_state().numpy(), "rng": self.rng.bit_generator.state}
+        parts = {name: getattr(self, name).state_dict() for name in self.PARTS}
+        return own | {"kept": self.kept} | parts
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Let a fresh run of the same settings go on from what ``state_dict`` returned."""
+        torch.set_rng_state(torch.from_numpy(state["torch"]))
+        self.rng.bit_generator.state = state["rng"]
+        # In place where that is possible, because a function of a change may hold an array.
+        for name, stored in state["kept"].items():
+            array = self.kept.setdefault(name, stored)
+            if (array.shape, array.dtype) == (stored.shape, stored.dtype):
+                array[...] = stored
+            else:
+                self.kept[name] = stored
+        for name in self.PARTS:
+            getattr(self, name).load_state_dict(state[name])
+
     def policy(self) -> Greedy:
         """Return a copy of what has been learned so far, with a card."""
         config, settings, points = self.config, dict(self.settings), self.curve.points
@@ -154,10 +199,12 @@ def train(
 
     A run that was stopped or killed and resumed gives the same weights and curve, bit for bit, as
     an uninterrupted one. A finished run is not repeated. The book's page "Training runs" says
-    what stands in ``run_dir``, on which machines bits agree, and what ``change`` may do. State of
-    an environment, network or change of yours that a checkpoint could not put back is refused at
-    the first one, by name: keep it in arrays of ``run.kept``, or give its owner methods ``state()``
-    and ``load_state(arrays)``.
+    what stands in ``run_dir``, on which machines bits agree, and what ``change`` may do.
+
+    A checkpoint keeps what ``state_dict()`` of the run's parts returns, an environment or physics
+    of yours included, the parameters and buffers of the network, and the arrays of ``run.kept``.
+    What stands elsewhere, in another attribute, a closure or a global, is not kept, and a run that
+    depends on it resumes as another one, which ``unload.check_resume`` finds out on a small run.
 
     Lifts by a physics of your own are a task of your own: a run knows it by the id under which it
     is registered, and another version of it needs another id::
@@ -186,9 +233,11 @@ def train(
             ``lambda point: writer.add_scalars("run", point, point["picks"])``. If it returns False,
             the run ends there, and is finished.
         change: is called with the ``Training`` before its first pick, and replaces methods.
-        same_code: say that ``stack``, ``change`` and ``network`` are the functions that the run in
-            ``run_dir`` was begun with. Only their names are kept, so that without it such a run is
-            neither resumed nor read back.
+        same_code: say that the run in ``run_dir`` was begun with the same code: with the same
+            functions ``stack``, ``change`` and ``network``, of which only names are kept, and a
+            package that trains in the same way. Without it a run of such functions is neither
+            resumed nor read back; one of another version of the package, or of a package with other
+            files, is not resumed, and a warning tells when it is read back.
 
     Returns:
         Policy and curve, read back from ``run_dir``.
@@ -213,11 +262,9 @@ def train(
         check_stack(stack)
         if config.env == ENVS[1]:
             raise ValueError(f"stack is given; expected None for env={config.env!r}")
-    folder = RunFolder(run_dir)
-    if not checks.boolean("same_code", same_code):
-        folder.check_code(stack=stack, change=change, network=config.network)
-
-    settings = settings_of_run(config, stack, change)
+    same_code = checks.boolean("same_code", same_code)
+    folder = RunFolder(run_dir, settings_of_run(config, stack, change), same_code)
+    folder.check_code(stack=stack, change=change, network=config.network)
     if not folder.finished:  # else it is only read, perhaps where nothing can be written
         with files.locked(folder.path), deferred_signals() as signals:
             if not folder.finished:  # by another process meanwhile
@@ -227,7 +274,23 @@ def train(
                     _finish(run, folder, progress, callback, signals)
                 finally:
                     run.rollout.close()
-    return folder.result(config, settings)
+    return _result(folder, config)
+
+
+def finished_run(
+    run_dir: str | Path, config: TrainConfig, change: Callable[[Training], None] | None = None
+) -> TrainResult:
+    """Read back a finished run of the same code, as ``train`` does with ``same_code``."""
+    settings = settings_of_run(config, change=change)
+    return _result(RunFolder(run_dir, settings, same_code=True), config)
+
+
+def _result(folder: RunFolder, config: TrainConfig) -> TrainResult:
+    folder.check_finished()
+    network = make_network(config.network, config.n_features)
+    # Older versions of pandas otherwise miss the last bit of some numbers.
+    curve = pd.read_csv(folder.curve, float_precision="round_trip")
+    return TrainResult(load_policy(folder.policy, network), curve)
 
 
 def _finish(
@@ -265,7 +328,7 @@ def _finish(
                 shares = {"MSR": f"{point.success_rate:.1%}", "loss": f"{point.loss:.3f}"}
                 bar.set_postfix(shares, refresh=False)
                 if time.monotonic() - curve_saved > CURVE_INTERVAL:
-                    folder.save_curve(run)
+                    folder.save_curve(run.curve.csv())
                     curve_saved = time.monotonic()
                 answer = None if callback is None else callback(point._asdict())
                 if isinstance(answer, (bool, np.bool_)) and not answer:
@@ -276,7 +339,9 @@ def _finish(
                     f"run_dir={str(folder.path)!r} to go on"
                 )
         run.agent.check_finite()
-        folder.finish(run)
+        save_policy(run.policy(), folder.policy)
+        folder.save_curve(run.curve.csv())
+        folder.finish()
     except FloatingPointError as error:
         step_complete = False
         raise FloatingPointError(

@@ -232,6 +232,20 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         """Free what the environments hold."""
         self._state = "closed"
 
+    def state_dict(self) -> dict[str, Any]:
+        """What a checkpoint keeps: arrays and what JSON can hold, not copied.
+
+        A subclass that remembers more extends this method and ``load_state_dict``.
+        """
+        generators = [rng.bit_generator.state for rng in self._rngs]
+        return {"generators": generators, "picks": self._picks}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Go on from what ``state_dict`` returned; the environments have been reset before."""
+        for rng, generator in zip(self._rngs, state["generators"], strict=True):
+            rng.bit_generator.state = generator
+        self._picks[:] = state["picks"]
+
     @abstractmethod
     def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator], **options) -> None:
         """Put fresh items into some environments, (k,) int64, drawn from the generator of each."""

@@ -157,7 +157,7 @@ class ContainerEnv(PickingEnv):
         self._check_started()
         if self.render_mode is None:
             return None
-        from unload.load.picture import snapshot  # here, because few look and Matplotlib is slow
+        from unload.drawing.picture import snapshot  # here, because few look and Matplotlib is slow
 
         return snapshot(self.physics.load, self.physics.present, self.physics.positions())
 

@@ -1,5 +1,7 @@
 """The hyperparameter-tuning environment: choose the highest item (Sec. IV-A)."""
 
+from typing import Any
+
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
@@ -50,6 +52,13 @@ class HighestItemVectorEnv(PickingVectorEnv):
         envs = np.flatnonzero(playing)
         self._fill(envs, [self._rngs[env] for env in envs])
         return rewards, {}
+
+    def state_dict(self) -> dict[str, Any]:
+        return super().state_dict() | {"observations": self._observations, "highest": self._highest}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        super().load_state_dict(state)
+        self._observations[:], self._highest[:] = state["observations"], state["highest"]
 
     def _emptied(self) -> np.ndarray:
         return np.zeros(self.num_envs, bool)  # there are always 128 items

@@ -162,6 +162,19 @@ class ContainerVectorEnv(PickingVectorEnv):
     def _emptied(self) -> np.ndarray:
         return self._containers.left == 0
 
+    def state_dict(self) -> dict[str, Any]:
+        """See ``PickingVectorEnv``; a physics with such methods is asked for its own state."""
+        own = {"containers": self._containers._asdict()}
+        if hasattr(self.physics, "state_dict"):
+            own["physics"] = self.physics.state_dict()
+        return super().state_dict() | own
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        super().load_state_dict(state)
+        self._containers = containers.Containers(**state["containers"])
+        if "physics" in state:
+            self.physics.load_state_dict(state["physics"])
+
     def _copy_observations(self) -> np.ndarray:
         return self._containers.observations.copy()
 

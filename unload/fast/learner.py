@@ -1,6 +1,7 @@
 """The fused twin of ``unload.agent.learner.PlainLearner``."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +45,14 @@ class FusedLearner:
             return float(gradients_and_loss[-1])
 
         return finish
+
+    def state_dict(self) -> dict[str, Any]:
+        own = {"steps": self.steps, "learning_rate": self.learning_rate}
+        return own | {"moments": self.moments}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        self.steps, self.learning_rate = state["steps"], state["learning_rate"]
+        self.moments[:] = state["moments"]
 
     def step(self, gradients: np.ndarray) -> None:
         """Change all weights once by their float64 gradients, one array after the other."""

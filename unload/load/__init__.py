@@ -1,5 +1,5 @@
 """A full container: its boxes, which of them touch, and how a load is stacked.
 
-Read ``boxes``, ``substacks``, ``picture`` and ``view``, in this order. Bad input is a TypeError or
-ValueError that names the argument, its value and what was expected.
+Read ``boxes``, then ``substacks``. Bad input is a TypeError or ValueError that names the argument,
+its value and what was expected.
 """

@@ -1,11 +1,12 @@
-"""Files of weights: safetensors with settings, and with a digest of both."""
+"""Files of weights: safetensors with settings, and with a digest of both; weights as arrays."""
 
 import json
 from collections.abc import Callable
 from hashlib import blake2b
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
+import numpy as np
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
@@ -70,6 +71,24 @@ def read_weights(path: str | Path, kind: str, make: Callable[[dict, dict], Made]
         return make(settings, tensors)
     except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
         raise ValueError(f"{path} holds no {kind} of unload: {error}") from error
+
+
+def as_arrays(value: Any) -> Any:
+    """Tensors, at any depth of dicts and lists, as arrays of the same memory; keys as text."""
+    if isinstance(value, torch.Tensor):
+        return value.detach().numpy()
+    if isinstance(value, dict):
+        return {str(name): as_arrays(part) for name, part in value.items()}
+    return [as_arrays(part) for part in value] if isinstance(value, (list, tuple)) else value
+
+
+def as_tensors(value: Any) -> Any:
+    """Arrays, at any depth of dicts and lists, as tensors of the same memory."""
+    if isinstance(value, np.ndarray):
+        return torch.from_numpy(value)
+    if isinstance(value, dict):
+        return {name: as_tensors(part) for name, part in value.items()}
+    return [as_tensors(part) for part in value] if isinstance(value, list) else value
 
 
 def _check_dtypes(name: str, tensors: dict[str, torch.Tensor]) -> None:

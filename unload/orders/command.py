@@ -67,7 +67,7 @@ def main(arguments: list[str] | None = None) -> None:
         text = order.map(_guarded).rename(columns=_guarded).to_csv(index=False, lineterminator="\n")
         if picture is not None:
             with checks.needed_for("--picture"):
-                from unload.load.picture import numbered
+                from unload.drawing.picture import numbered
             drawn = numbered(load, order["item"].to_numpy())
             files.write_atomically(picture, lambda file: file.write(drawn))
         _write(text, output)

@@ -16,6 +16,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from filelock import FileLock, Timeout
 
+ARRAY = "array of this file"  # stands for an array in the JSON of nested values
 SHIPPED = Path(str(resources.files("unload") / "data"))  # what the package needs wherever it is
 POLICIES = {file.stem: file for file in sorted(SHIPPED.glob("policies/*.safetensors"))}  # by name
 
@@ -118,6 +119,58 @@ def _digest_of_arrays(arrays: dict[str, np.ndarray]) -> np.ndarray:
     for name in sorted(arrays):
         content.update(np.ascontiguousarray(arrays[name]).data)
     return np.frombuffer(content.digest(), np.uint8)
+
+
+def write_nested(path: str | Path, value: Any) -> None:
+    """Write arrays in lists and dicts, at any depth, as an ``.npz`` file with a digest.
+
+    Args:
+        value: NumPy's arrays of numbers or text, and what JSON can hold: lists, dicts by text,
+            text, numbers, None.
+
+    Raises:
+        TypeError: it holds something else, be it a subclass of these; the message says where.
+    """
+    arrays: dict[str, np.ndarray] = {}
+    text = json.dumps(_storable(value, arrays, ()))
+    write_arrays(path, arrays | {"json": np.frombuffer(text.encode(), np.uint8)})
+
+
+def _storable(value: Any, arrays: dict[str, np.ndarray], place: tuple) -> Any:
+    """What JSON gives back as it was; of an array its name, under which it is put aside."""
+    if isinstance(value, np.generic) and value.dtype.kind in "biufU":
+        value = value.item()
+    kind = type(value)
+    if kind in (str, int, float, bool, type(None)):
+        return value
+    if kind in (list, tuple):
+        return [_storable(part, arrays, (*place, at)) for at, part in enumerate(value)]
+    if kind is dict and ARRAY not in value and {*map(type, value)} <= {str}:
+        return {name: _storable(part, arrays, (*place, name)) for name, part in value.items()}
+    if kind is np.ndarray and value.dtype.kind in "biufcSU":
+        name = f"array {len(arrays)}"
+        arrays[name] = value
+        return {ARRAY: name}
+    found = f"a {kind.__name__}"
+    if kind is dict:
+        found = f"a dict by {[*value]}"
+    elif kind is np.ndarray:
+        found = f"an array of {value.dtype}"
+    where = ".".join(map(str, place)) or "the whole"
+    raise TypeError(f"{where} is {found}; expected arrays and what JSON can hold")
+
+
+def read_nested(path: str | Path) -> Any:
+    """Read what ``write_nested`` wrote; tuples have become lists, NumPy's scalars Python's."""
+    arrays = read_arrays(path, checked=True)
+
+    def resolve(part: dict) -> Any:
+        return arrays[part[ARRAY]] if ARRAY in part else part
+
+    try:
+        return json.loads(arrays["json"].tobytes(), object_hook=resolve)
+    except Exception as error:  # another kind of file may hold anything
+        raise ValueError(f"{path} holds no nested values: {error!r}") from error
 
 
 def digest(path: str | Path) -> str:

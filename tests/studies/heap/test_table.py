@@ -16,7 +16,7 @@ from studies.heap.rake import Outcome
 from studies.heap.recording import HEAPS, make_networks
 from studies.heap.table import best_rule, family
 from studies.results import read_provenance, read_table
-from unload.load.picture import COLOURS
+from unload.drawing.picture import COLOURS
 
 
 @pytest.mark.pybullet

@@ -5,8 +5,8 @@ import pytest
 
 from tests.load.walls import of_corners
 from unload import task
-from unload.load import picture
-from unload.load.picture import (
+from unload.drawing import picture
+from unload.drawing.picture import (
     COLOURS,
     CORNERS,
     EYE,

@@ -1,6 +1,8 @@
 """What is kept of a run on disk, and how it goes on from there."""
 
+import copy
 import errno
+import re
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,7 +12,8 @@ import pytest
 
 from tests.agent.runs import CONTAINER, assert_same, few_walls, interrupt_run, kill_run, metres
 from unload import TrainConfig, stack_load, train
-from unload.agent.checkpoint import settings_of_run
+from unload.agent.config import settings_of_run
+from unload.checkpoint.settings import package
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import files
 
@@ -34,7 +37,7 @@ def test_a_run_is_not_gone_on_with_by_another_engine(tmp_path, monkeypatch):
     config = TrainConfig(**CONTAINER)
     interrupt_run(config, tmp_path, 3)
     (other,) = {*ENGINES} - {engine_of()}
-    monkeypatch.setattr("unload.agent.checkpoint.engine_of", lambda: other)
+    monkeypatch.setattr("unload.agent.config.engine_of", lambda: other)
     with pytest.raises(ValueError, match=r"engine \(.* not .*\)"):
         train(config, tmp_path, progress=False)
     heights = replace(config, env="unload/HighestItem-v0")
@@ -66,27 +69,45 @@ def checkpoint(tmp_path) -> Path:
     return tmp_path / "run" / "checkpoint.npz"
 
 
-def test_a_checkpoint_of_another_version_is_refused(checkpoint):
-    config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint)
-    for change, message in (
-        ({"format": np.array(9)}, "is not of format 13; if another version of unload"),
-        ({"version": np.array("0.1.0")}, "is of unload 0.1.0; if another version of unl"),
-        ({"settings": np.array("{")}, "JSONDecodeError"),
+def test_a_checkpoint_that_is_not_of_this_code_or_of_no_run_is_refused(checkpoint):
+    config, stored = TrainConfig(**CONTAINER), files.read_nested(checkpoint)
+    del (without := copy.deepcopy(stored))["run"]["rollout"]["steps"]
+    for other, message in (
+        (stored | {"format": 13}, "is not of format 14; if another version of unload"),
+        ({}, "is not of format 14"),
+        ([1], "is not of format 14"),
+        (stored | {"settings": {}}, "another configuration: env .None, not 'unload/Container"),
+        (without, "does not fit this run: KeyError: 'steps'"),
     ):
-        files.write_arrays(checkpoint, arrays | change)
-        with pytest.raises(ValueError, match=f"checkpoint.npz .*({message})"):
+        files.write_nested(checkpoint, other)
+        with pytest.raises(ValueError, match=f"checkpoint.npz .*{message}"):
             train(config, checkpoint.parent, progress=False)
+    files.write_arrays(checkpoint, {"format": np.array(13)})  # as an earlier version did
+    with pytest.raises(ValueError, match="checkpoint.npz holds no nested values.* another vers"):
+        train(config, checkpoint.parent, progress=False)
 
 
-def test_a_checkpoint_without_an_array_or_with_another_is_refused(checkpoint):
-    config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint)
-    contents = [{each: arrays[each] for each in arrays if each != name} for name in arrays]
-    for other in (*contents, arrays | {"more": np.zeros(1)}):
-        files.write_arrays(checkpoint, other)
-        with pytest.raises(ValueError, match="checkpoint.npz"):
-            train(config, checkpoint.parent, progress=False)
-    np.savez(checkpoint, **arrays)  # as another program writes it, without a digest
-    with pytest.raises(ValueError, match="checkpoint.npz was changed or damaged.* another vers"):
+def test_a_run_of_another_package_is_named(checkpoint, monkeypatch):
+    """Where it is not finished it is refused, unless the caller says that the code is the same."""
+    config, other, this = TrainConfig(**CONTAINER), "unload 0.2.0 (00ff)", package()
+    monkeypatch.setattr("unload.checkpoint.folder.package", lambda: other)
+    wanted = re.escape(f"is of {this}; expected {other}, or same_code=True")
+    with pytest.raises(ValueError, match=f"checkpoint.npz {wanted}"):
+        train(config, checkpoint.parent, progress=False)
+    train(config, checkpoint.parent, progress=False, same_code=True)
+    train(config, checkpoint.parent, progress=False)
+
+    monkeypatch.undo()
+    said = re.escape(f"holds a run that {other} has trained, and this is {this}; same_code=True")
+    with pytest.warns(UserWarning, match=said) as warned:
+        train(config, checkpoint.parent, progress=False)
+    assert warned[0].filename == __file__
+    train(config, checkpoint.parent, progress=False, same_code=True)
+    path = checkpoint.with_name("config.json")
+    stored = files.read_json(path)
+    del stored["package"]
+    files.write_json(path, stored, checked=True)
+    with pytest.warns(UserWarning, match="holds a run that an earlier unload has trained"):
         train(config, checkpoint.parent, progress=False)
 
 

@@ -12,7 +12,7 @@ from matplotlib.colors import to_hex
 from plotly.io import renderers
 
 from unload import task
-from unload.load import picture
+from unload.drawing import picture
 from unload.load.boxes import Load, check_load
 from unload.support import checks
 

@@ -9,8 +9,8 @@ from matplotlib.colors import to_hex
 from matplotlib.image import imread
 
 from unload import Load, view
-from unload.load.picture import COLOURS
-from unload.load.view import _OTHER_COLOURS, _PLOTLY_MIMETYPE
+from unload.drawing.picture import COLOURS
+from unload.drawing.view import _OTHER_COLOURS, _PLOTLY_MIMETYPE
 
 
 def items(trace) -> list[int]:
