@@ -44,7 +44,7 @@ def test_other_lifts_are_of_other_physics(monkeypatch):
     found = {physics_fingerprint.__wrapped__()}
     assert found == {physics_fingerprint.__wrapped__()}
     others = [(table, "HELD_DOWN", 2), (table, "HELD_DOWN", 4), (table, "FREE_LIFT", 0.1)]
-    others += [(kind, "lift", lambda self, item: 0.1) for kind in (LocalPhysics, FullPhysics)]
+    others += [(kind, "lift", lambda self, *item: 0.1) for kind in (LocalPhysics, FullPhysics)]
     for owner, name, other in others:
         with monkeypatch.context() as patch:
             patch.setattr(owner, name, other)

@@ -16,6 +16,7 @@ from unload.physics.table import FREE_LIFT, HELD_DOWN, UNKNOWN, find_distance
 from unload.support.compiled import compiled
 
 _N_VISIBLE = task.N_VISIBLE
+NO_ENTRIES = np.zeros(0, np.uint64), np.zeros(0, np.int32)  # of a table
 
 
 class Containers(NamedTuple):
@@ -103,11 +104,11 @@ def _show(containers, env, rows, equalize, average):
 
 
 @compiled
-def look_up(containers, actions, always_simulate, digests, micrometres):
+def look_up(containers, actions, looked_up, digests, micrometres):
     """Each chosen item, (E,) int64, and how far it moves in m, or ``UNKNOWN``, (E,) float64.
 
-    Where the row is padded, the item is -1 and moves by 0. With ``always_simulate``, for a physics
-    that the table does not speak for, only what has failed is known.
+    Where the row is padded, the item is -1 and moves by 0. Without ``looked_up``, for a physics
+    that no table speaks for, only what has failed is known.
     """
     items, distances = np.empty(len(actions), np.int64), np.empty(len(actions))
     capacity = containers.present.shape[1]
@@ -124,7 +125,7 @@ def look_up(containers, actions, always_simulate, digests, micrometres):
             distances[env] = containers.failed[env, row]
             continue
 
-        if always_simulate:
+        if not looked_up:
             distances[env] = UNKNOWN
             continue
 

@@ -187,6 +187,9 @@ class Load:
             pairs.append(np.flatnonzero(across & (beyond > beyond[box])))
         return np.repeat(np.arange(len(self)), [*map(len, pairs)]), np.concatenate(pairs)
 
+    def __deepcopy__(self, memo: dict) -> "Load":
+        return self  # nothing of it changes
+
     def __len__(self) -> int:
         return len(self.positions)
 

@@ -107,6 +107,10 @@ class Client:
         self.number = _pybullet().connect(_pybullet().DIRECT)
         self.disconnect = weakref.finalize(self, _pybullet().disconnect, self.number)
 
+    def __reduce_ex__(self, protocol):
+        """Refuse to be copied or pickled, because both would step the same simulator."""
+        raise TypeError("a simulator of PyBullet cannot be copied or pickled; make another one")
+
     def __getattr__(self, name: str) -> Any:
         attribute = getattr(_pybullet(), name)
         return partial(attribute, physicsClientId=self.number) if callable(attribute) else attribute

@@ -3,9 +3,8 @@
 import numpy as np
 
 from unload import task
-from unload.load.boxes import Load, check_no_overhang
+from unload.load.boxes import Load
 from unload.physics import mujoco
-from unload.physics.base import Physics
 from unload.physics.bullet import ENGINES, SETTINGS, World, engine_of, slim
 from unload.physics.situation import RESOLUTION, Situation, Surroundings
 
@@ -17,28 +16,32 @@ def settings_of_lifts(engine: str) -> dict:
     return SETTINGS if engine == ENGINES[0] else mujoco.settings()
 
 
-class LocalPhysics(Physics):
+class LocalPhysics:
     """Simulates the situation of the chosen box, on the load's exact grid.
 
     The chosen box and all that rests on it are free to move; what they stand on, their
     neighbours in the wall, the floor and the side walls are fixed; the rest is left out.
-    A failed lift has no effect on the container (Sec. III-D). ``surroundings`` holds the
-    situations of the load's items.
+    A failed lift has no effect on the container (Sec. III-D). What was lifted before makes no
+    difference, not in one bit, so that any number of containers may share one.
 
     Args:
         engine: ``"pybullet"`` or ``"mujoco"``; PyBullet where it is installed if None.
     """
 
     def __init__(self, engine: str | None = None) -> None:
-        super().__init__()
         self.engine = engine_of(engine)
+        self._world: World | None = None  # started when it is first needed, and after ``close``
+
+    def __deepcopy__(self, memo: dict) -> "LocalPhysics":
+        return self  # copies of an environment share it
+
+    @property
+    def known(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """What compiled loops may look up instead of asking ``simulate``, see ``TablePhysics``."""
+        return None
 
     def simulate(self, situation: Situation) -> float:
-        """Pull the chosen box of a situation; return how far it moved, in m, to the micrometre.
-
-        What was lifted before makes no difference, not in one bit.
-        """
-        self._check_open()
+        """Pull the chosen box of a situation; return how far it moved, in m, to the micrometre."""
         if self.engine == "mujoco":
             return round(mujoco.simulate(situation), 6)
         if self._world is None:
@@ -63,9 +66,18 @@ class LocalPhysics(Physics):
             for body in reversed(bodies):
                 world.remove(body)
 
-    def _reset(self, load: Load) -> None:
-        check_no_overhang(load)
-        self.surroundings = Surroundings(load, self.present)
+    def lift(self, load: Load, present: np.ndarray, item: int) -> float:
+        """Pull an item of a load of which the ``present`` ones are left; see ``simulate``.
 
-    def _lift(self, item: int) -> float:
-        return self.simulate(self.surroundings.situation(item))
+        Args:
+            load: without overhangs, see ``boxes.check_no_overhang``.
+            present: (n,) bool, True for ``item``.
+            item: its number in the load.
+        """
+        return self.simulate(Surroundings(load, present).situation(item))
+
+    def close(self) -> None:
+        """Free the simulator, which starts again when it is next needed."""
+        if self._world is not None:
+            self._world.close()
+            self._world = None

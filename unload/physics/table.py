@@ -10,6 +10,7 @@ import json
 from functools import cache
 from pathlib import Path
 from threading import Lock
+from typing import Literal
 
 import numpy as np
 
@@ -66,9 +67,6 @@ class LiftTable:
 
     def __len__(self) -> int:
         return len(self.entries[0])
-
-    def __deepcopy__(self, memo: dict) -> "LiftTable":
-        return self  # it is shared; Gymnasium copies what it is given
 
     def find(self, situation: Situation) -> float | None:
         """Return the distance in m that the table holds for a situation, or None."""
@@ -131,9 +129,13 @@ class TablePhysics(LocalPhysics):
         self.table = LiftTable() if table is None else table
         super().__init__(self.table.engine)
 
+    @property
+    def known(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """The entries of its table; None for a subclass, whose ``simulate`` no loop knows."""
+        return self.table.entries if type(self) is TablePhysics else None
+
     def simulate(self, situation: Situation) -> float:
         """Look a lift up, or simulate and remember it; return the distance in m."""
-        self._check_open()
         if situation.on_top == 0:
             return FREE_LIFT
         if situation.on_top >= HELD_DOWN:
@@ -152,6 +154,18 @@ def shared_table() -> LiftTable:
     if table.engine != engine_of():  # PyBullet's answers serve where it is missing, too
         table.engine, table.foreign = engine_of(), table.entries[0]
     return table
+
+
+def make_physics(physics: Literal["local", "table"] | LocalPhysics) -> LocalPhysics:
+    """The physics of a name; or the one that is given."""
+    if isinstance(physics, LocalPhysics):
+        return physics
+    wanted = "expected 'local', 'table', or a LocalPhysics, whose simulate decides a lift"
+    if not isinstance(physics, str):
+        raise TypeError(f"physics is {physics!r}; {wanted}")
+    if physics not in ("local", "table"):
+        raise ValueError(f"physics is {physics!r}; {wanted}")
+    return TablePhysics(shared_table()) if physics == "table" else LocalPhysics()
 
 
 def _digest(situation: Situation) -> np.uint64:
