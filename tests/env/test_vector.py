@@ -11,7 +11,9 @@ from gymnasium.vector import AutoresetMode
 import unload
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, few_items, make_pair
 from tests.load.walls import crossed_bars, own_load
+from unload import plain
 from unload.env.vector import ContainerVectorEnv
+from unload.physics.local import LocalPhysics
 from unload.physics.table import LiftTable, TablePhysics
 
 
@@ -84,6 +86,29 @@ def test_containers_and_boxes_of_other_sizes_stand_side_by_side(kind):
         return unload.Load(load.positions, load.sizes, **fields)
 
     play_both(CONTAINER, 3, 60, seed=3, max_picks=20, stack=stack)
+
+
+def test_side_walls_and_viewpoint_are_those_of_the_loads_container():
+    """A load of the paper, made wider and higher along with its container."""
+
+    class Sides(LocalPhysics):
+        def simulate(self, situation) -> float:
+            return len(situation.sides) / 100
+
+    neat, scale = unload.build_load(np.zeros((1, 3, 4), int)), np.array([0.9, 1.3, 1.6])
+    load = unload.Load(scale * neat.positions, scale * neat.sizes, container=scale * neat.container)
+    envs = ContainerVectorEnv(1, Sides(), position_noise=0.0)
+    envs.reset(options={"load": load})
+    items = envs.visible[0, : len(load)]
+    rows = [envs.step([row])[4] for row in range(len(items))]
+    sides = [len(plain.situation(load, np.ones(len(load), bool), item).sides) for item in items]
+    assert [round(100 * infos["distance"][0]) for infos in rows] == sides
+    assert {0, 1} == {*sides}
+
+    # Nearest is what is nearest to the middle of the entrance's upper edge (Sec. III-B).
+    offset = load.positions - load.container * (1, 0.5, 1)
+    distance = np.sqrt(offset[:, 0] ** 2 + 4 * offset[:, 2] ** 2)
+    assert (np.diff(distance[items]) > -1e-9).all()
 
 
 @pytest.mark.parametrize("seed", range(20))
