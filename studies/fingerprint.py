@@ -24,7 +24,7 @@ from unload.physics.local import LocalPhysics
 from unload.physics.table import TablePhysics
 
 # Of the boxes of a wall from above, all or every twelfth, because simulating takes long.
-LIFTED = {TablePhysics: 1, LocalPhysics: 12, FullPhysics: 12}
+LIFTED = {partial(TablePhysics, exact=True): 1, LocalPhysics: 12, FullPhysics: 12}
 
 
 def training_fingerprint(networks: Iterable[str | Callable] = ("peq",)) -> str:

@@ -29,7 +29,7 @@ from unload.physics.bullet import ENGINES, SETTINGS
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Surroundings
-from unload.physics.table import HELD_DOWN, LIFTS_FILE
+from unload.physics.table import HELD_DOWN, LIFTS_FILE, LiftTable, TablePhysics
 from unload.support import files
 
 NAME = "lift_agreement"
@@ -134,7 +134,9 @@ def collect_lifts(lifts: int, seed: int) -> tuple[list[tuple[Load, np.ndarray]],
         The states, of each the load and (n,) bool, which items are left; and the columns of
         ``agreement_data`` without those of ``full`` but with ``state``, an index into the states.
     """
-    local, states, rows, names = LocalPhysics(ENGINES[0]), [], [], list(UNLOADED_BY)
+    shipped = TablePhysics(LiftTable.load(LIFTS_FILE, ENGINES[0]), exact=True)
+    asked = {"table": shipped, "local": LocalPhysics(ENGINES[0])}
+    states, rows, names = [], [], list(UNLOADED_BY)
     numbers: dict[bytes, int] = {}  # of situations
     rng = np.random.default_rng([seed, 2])
     while len(rows) < lifts:
@@ -157,8 +159,7 @@ def collect_lifts(lifts: int, seed: int) -> tuple[list[tuple[Load, np.ndarray]],
                     number = numbers.setdefault(situation.key, len(numbers))
                     row = {"picks": picks, "state": len(states), "item": item}
                     row |= {"on_top": situation.on_top, "situation": number}
-                    for name, physics in (("table", env.physics), ("local", local)):
-                        row[name] = physics.simulate(situation)
+                    row |= {name: each.simulate(situation) for name, each in asked.items()}
                     rows.append(named | row)
             states.append((env.load, env.present))
     return states, pd.DataFrame(rows)

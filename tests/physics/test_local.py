@@ -16,7 +16,7 @@ from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
 from unload.physics.table import TablePhysics
 
-KINDS = {"full": FullPhysics, "local": LocalPhysics, "table": TablePhysics}
+KINDS = {"full": FullPhysics, "local": LocalPhysics, "table": partial(TablePhysics, exact=True)}
 KINDS["mujoco"] = partial(LocalPhysics, "mujoco")
 # The same as parameters of tests.
 EACH = [pytest.param("full", marks=pytest.mark.pybullet), "local", "table", "mujoco"]

@@ -19,6 +19,7 @@ from unload.load.boxes import Load
 from unload.load.substacks import stack_load
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
+from unload.physics.table import PhysicsName
 from unload.support import checks
 
 MOST_EPISODES = 10**6
@@ -45,7 +46,7 @@ def evaluate(
     policy: Policy,
     episodes: int = 20,
     seed: int = 0,
-    physics: Literal["local", "full", "table"] | LocalPhysics | FullPhysics = "table",
+    physics: Literal["full"] | PhysicsName | LocalPhysics | FullPhysics = "table",
     mask: bool = True,
     max_picks: int | None = task.MAX_PICKS,
     equalize: bool = False,

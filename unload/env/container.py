@@ -15,6 +15,7 @@ from unload.load.boxes import Load
 from unload.load.substacks import stack_load
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
+from unload.physics.table import PhysicsName
 
 
 class ContainerEnv(PickingEnv):
@@ -79,8 +80,9 @@ class ContainerEnv(PickingEnv):
         physics: what is simulated at a lift: ``"local"`` (the situation of the chosen box),
             ``"full"`` (every box: seconds a pick) or ``"table"`` (``"local"``, remembered), which
             answers without a simulation if nothing rests on the chosen box (it moves by
-            0.463053 m) or if three boxes or more do (0 m). Or a ``LocalPhysics`` of your own, or a
-            ``FullPhysics``, whose container the environment fills.
+            0.463053 m), if three boxes or more do, or one or two on its middle (0 m); or
+            ``"places"``, which says that whatever has a box on it is held down. Or a
+            ``LocalPhysics`` of your own, or a ``FullPhysics``, whose container is filled.
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
         max_picks: greatest length of an episode.
@@ -111,7 +113,7 @@ class ContainerEnv(PickingEnv):
 
     def __init__(
         self,
-        physics: Literal["local", "full", "table"] | LocalPhysics | FullPhysics = "local",
+        physics: Literal["full"] | PhysicsName | LocalPhysics | FullPhysics = "local",
         equalize: bool = False,
         ties: str = "noise",
         max_picks: int = task.MAX_PICKS,

@@ -1,7 +1,7 @@
 """Many containers in arrays (Sec. III-A, Fig. 2): what ``PickingVectorEnv.step`` asks of them."""
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from unload.load.boxes import Load, check_no_overhang, check_stack, check_suppor
 from unload.load.substacks import stack_load
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import situation_in
-from unload.physics.table import make_physics
+from unload.physics.table import PhysicsName, make_physics
 
 
 class ContainerVectorEnv(PickingVectorEnv):
@@ -23,9 +23,9 @@ class ContainerVectorEnv(PickingVectorEnv):
     See ``ContainerEnv`` for the task and for the arguments not explained here.
 
     Args:
-        physics: ``"table"``, ``"local"``, or a ``LocalPhysics`` of your own. Of yours ``simulate``
-            is called, for each pick that does not repeat a failed one, and ``close``; a
-            ``TablePhysics`` is asked only what its table lacks.
+        physics: ``"table"``, ``"places"``, ``"local"``, or a ``LocalPhysics`` of your own. Of yours
+            ``simulate`` is called, for each pick that does not repeat a failed one, and ``close``;
+            a ``TablePhysics`` is asked only what neither its table nor a rule answers.
 
     Attributes:
         physics: what lifts.
@@ -38,7 +38,7 @@ class ContainerVectorEnv(PickingVectorEnv):
     def __init__(
         self,
         num_envs: int = task.NUM_ENVS,
-        physics: Literal["local", "table"] | LocalPhysics = "table",
+        physics: PhysicsName | LocalPhysics = "table",
         stack: Callable[[np.random.Generator], Load] = stack_load,
         **settings,
     ) -> None:
@@ -131,9 +131,8 @@ class ContainerVectorEnv(PickingVectorEnv):
         What is not known, ``physics`` simulates; a ``TablePhysics`` adds it to its table.
         """
         state = self._containers
-        known = self.physics.known
-        entries = containers.NO_ENTRIES if known is None else known
-        items, distances = containers.look_up(state, actions, known is not None, *entries)
+        known = self.physics.known or containers.NOTHING_KNOWN
+        items, distances = containers.look_up(state, actions, *known)
         unknown = np.flatnonzero(distances == containers.UNKNOWN)
         if unknown.size:
             arrays = (state.starts, state.links, state.present, state.geometry, state.widths, items)

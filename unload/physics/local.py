@@ -1,5 +1,7 @@
 """Lifts of a box in its situation: nothing else in the container is simulated."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from unload import task
@@ -36,14 +38,20 @@ class LocalPhysics:
         return self  # copies of an environment share it
 
     @property
-    def known(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """What compiled loops may look up instead of asking ``simulate``, see ``TablePhysics``."""
+    def known(self) -> tuple[int, bool, np.ndarray, np.ndarray] | None:
+        """What compiled loops may answer by, without ``simulate``; see ``TablePhysics``."""
         return None
 
     def simulate(self, situation: Situation) -> float:
         """Pull the chosen box of a situation; return how far it moved, in m, to the micrometre."""
+        return self._pull(situation)
+
+    def _pull(
+        self, situation: Situation, hopeless: Callable[[float, float], bool] | None = None
+    ) -> float:
+        """``simulate``, or give up half-way, see ``bullet.World.pull``."""
         if self.engine == "mujoco":
-            return round(mujoco.simulate(situation), 6)
+            return round(mujoco.simulate(situation, hopeless), 6)
         if self._world is None:
             self._world = World()
         elif self._world.bodies > _MOST_BODIES:
@@ -61,7 +69,7 @@ class LocalPhysics:
             for side in situation.sides:
                 outwards = np.sign(side) * 0.5
                 bodies.append(world.add_box((0, side * RESOLUTION + outwards, 0), (9, 1, 9), 0))
-            return round(world.pull(bodies[0]), 6)
+            return round(world.pull(bodies[0], hopeless=hopeless), 6)
         finally:  # also when interrupted: what stays behind would be in the way of the next lift
             for body in reversed(bodies):
                 world.remove(body)
