@@ -9,19 +9,22 @@ anew. Both engines lift each box to the end, and what an empty table says by eac
 
 from collections.abc import Iterator
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from studies.lifts.own_loads import FAMILIES
 from studies.results import COMMAND, measured, publish
 from studies.statistics import share_interval
+from studies.style import styled
 from unload import task
 from unload.env import observation
 from unload.load.boxes import Load
 from unload.physics.bullet import ENGINES
 from unload.physics.local import LocalPhysics, settings_of_lifts
 from unload.physics.situation import Situation, Surroundings
-from unload.physics.table import HELD_DOWN, MIDDLE, LiftTable, TablePhysics, held_by_rule
+from unload.physics.table import FARTHEST, HELD_DOWN, MIDDLE, LiftTable, TablePhysics, held_by_rule
 
 NAME = "certain_lifts"
 # First seed of a part, and how many lifts of each family; no other data uses these seeds.
@@ -48,7 +51,11 @@ def certain_data() -> None:
     """
     lifts = measured(ask_all)
     settings = {engine: settings_of_lifts(engine) for engine in ENGINES}
-    settings |= {"middle": MIDDLE, "first seed and lifts of each family": PARTS}
+    settings |= {
+        "middle": MIDDLE,
+        "farthest": FARTHEST,
+        "first seed and lifts of each family": PARTS,
+    }
     publish(NAME, {NAME: lifts.value}, f"{COMMAND} certain", settings, [lifts], float_format="%.6f")
 
 
@@ -94,6 +101,31 @@ def by_answer(frame: pd.DataFrame) -> pd.DataFrame:
         row["at most"] = share_interval(int(row["wrong, pybullet"]), len(group))[1]
         rows[name] = row
     return pd.DataFrame(rows).T.astype({"lifts": int} | {f"wrong, {each}": int for each in ENGINES})
+
+
+@styled
+def over_middle(frame: pd.DataFrame) -> Figure:
+    """How far PyBullet lifts a box over how far off its middle one or two others lie on it.
+
+    Args:
+        frame: see ``certain_data``. The rule answers filled dots, in the shaded part.
+    """
+    figure, panels = plt.subplots(1, HELD_DOWN - 1, figsize=(9, 3.6), sharex=True, sharey=True)
+    for on_top, axes in enumerate(panels, 1):
+        lifts = frame[frame["on_top"] == on_top]
+        for number, (family, group) in enumerate(lifts.groupby("family", sort=False)):
+            ruled = group["answer"] == ANSWERS[1]
+            for some, face in ((group[ruled], f"C{number}"), (group[~ruled], "none")):
+                dots = {"s": 14, "edgecolor": f"C{number}", "facecolor": face, "linewidth": 0.7}
+                label = family if face == "none" else None
+                axes.scatter(some["common"], some[ENGINES[0]], label=label, **dots)
+        axes.axvspan(0, MIDDLE[on_top], color="0.93", zorder=0)
+        axes.axhline(task.LIFT_THRESHOLD, color="C5", ls="--", lw=1, label="threshold")
+        axes.set(xlim=(0, MAX_OFFSET), xlabel="common centre off the middle (half edges)")
+        axes.set_title("one box on top" if on_top == 1 else f"{on_top} boxes on top", fontsize=9)
+    panels[0].set_ylabel("distance moved (m)")
+    panels[0].legend(fontsize=8)
+    return figure
 
 
 def _answer(situation: Situation, distance: float) -> str:

@@ -85,9 +85,11 @@ def _cut(rng: np.random.Generator, end: float, steps: Interval) -> list[Interval
 
 
 def _divided(rng: np.random.Generator, first: float, length: float, count: int) -> list[Interval]:
-    """An interval in so many neighbouring ones."""
-    ends = first + length * np.append(0, rng.dirichlet(np.full(count, 30.0)).cumsum())
-    return list(zip(ends[:-1].tolist(), ends[1:].tolist()))
+    """An interval in so many neighbouring ones, of which none is twice as long as another."""
+    ends = np.zeros(count + 1)
+    rng.uniform(1.0, 2.0, count).cumsum(out=ends[1:])
+    ends = (first + length / ends[-1] * ends).tolist()
+    return list(zip(ends, ends[1:]))
 
 
 def _part(rng: np.random.Generator, first: float, last: float) -> Interval:

@@ -166,6 +166,21 @@ def test_known_lifts_are_looked_up_by_the_compiled_loop(physics, monkeypatch):
     assert_same(play(), first)
 
 
+def test_places_alone_say_what_is_free(monkeypatch):
+    monkeypatch.setattr(TablePhysics, "simulate", Mock(side_effect=AssertionError))
+    envs = ContainerVectorEnv(1, "places", stack=lambda rng: own_load(rng, "continuous sizes"))
+    envs.reset(seed=0)
+    load, items = own_load(np.random.default_rng(0), "continuous sizes"), envs.visible[0]
+    free = ~load.covered(np.ones(len(load), bool))[items]
+    assert_same(envs.liftable()[0], free)
+    assert 5 < free.sum() < 120
+    single = unload.ContainerEnv("places", stack=envs.stack)
+    single.reset(seed=0)
+    monkeypatch.undo()
+    assert (single.liftable() == free).all()
+    assert single.step(int(free.argmin()))[4]["distance"] == 0
+
+
 def test_another_physics_is_asked_about_each_pick_that_has_not_failed():
     class Gripper(TablePhysics):
         def simulate(self, situation) -> float:

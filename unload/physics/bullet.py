@@ -113,8 +113,11 @@ class Client:
         raise TypeError("a simulator of PyBullet cannot be copied or pickled; make another one")
 
     def __getattr__(self, name: str) -> Any:
-        attribute = getattr(_pybullet(), name)
-        return partial(attribute, physicsClientId=self.number) if callable(attribute) else attribute
+        found = getattr(_pybullet(), name)
+        if callable(found):
+            found = partial(found, physicsClientId=self.number)
+        setattr(self, name, found)  # found without this function the next time
+        return found
 
 
 class World:

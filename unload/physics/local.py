@@ -60,9 +60,10 @@ class LocalPhysics:
         world = self._world
         bodies: list[int] = []
         try:
-            for row, box in enumerate(situation.boxes * RESOLUTION):
+            places, sizes = np.split(situation.boxes * RESOLUTION, 2, axis=1)
+            for row, (place, size) in enumerate(zip(places.tolist(), slim(sizes).tolist())):
                 mass = task.MASS if row < situation.dynamic else 0.0
-                bodies.append(world.add_box(box[:3], slim(box[3:]), mass))
+                bodies.append(world.add_box(place, size, mass))
             if situation.floor is not None:
                 height = situation.floor * RESOLUTION
                 bodies.append(world.add_box((0, 0, height - 0.5), (9, 9, 1), 0))

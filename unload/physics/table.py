@@ -26,9 +26,10 @@ PhysicsName = Literal["local", "places", "table"]
 
 UNKNOWN = -1  # in place of a distance that is not in the table
 HELD_DOWN = 3  # so many boxes on top hold a box down
-# One or two hold it down, too, if the centre of each is over it, and their common centre no farther
-# from its own, along x and along y, than this share of the half edge.
-MIDDLE = 0.4
+# One or two hold it down, too, if their common centre is no farther from its own, along x and y,
+# than a share of the half edge, by their number; and none farther than ``FARTHEST`` half edges.
+MIDDLE = (0.0, 0.5, 0.75)
+FARTHEST = 2.0
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
 _ARRAYS = {"digests", "micrometres", "settings"}  # of a file
 
@@ -221,8 +222,8 @@ def find_distance(digests, micrometres, digest):
 def held_by_rule(key):
     """Whether the boxes on top of the chosen one, one or two, lie on its middle, see ``MIDDLE``.
 
-    Both would be raised: the upper box by a lever that takes half of its weight at least, on each
-    side, and the pull can raise 1.04 boxes besides the chosen one.
+    The pull raises 1.04 boxes besides the chosen one. So one on its middle rises by 9 mm, and off
+    it, it tips aside; two on it hold it down even if their other ends lie on neighbours.
 
     Args:
         key: the words of a situation's key, see ``write_key``.
@@ -234,9 +235,9 @@ def held_by_rule(key):
         edge, total = key[first + 3 + axis], 0
         for box in range(1, on_top + 1):
             centre = key[first + 6 * box + axis]
-            if 2 * abs(centre) > edge:
+            if 2 * abs(centre) > FARTHEST * edge:
                 return False
             total += centre
-        if 2 * abs(total) > MIDDLE * on_top * edge:
+        if 2 * abs(total) > MIDDLE[on_top] * on_top * edge:
             return False
     return True
