@@ -7,7 +7,7 @@ from functools import partial
 from studies.falls import laboratory, long
 from studies.grid import train_grid
 from studies.heap import greed, table
-from studies.lifts import agreement, engines, lift_table
+from studies.lifts import agreement, certain, engines, lift_table
 from studies.mask import laboratory as mask_laboratory
 from studies.mask import training as mask
 from studies.mask.cells import MASK
@@ -56,6 +56,7 @@ def sb3(n_jobs: int) -> None:
 PARTS: dict[str, tuple[str, Callable, dict]] = {
     "lifts": ("the lift table, and the physics that it stands for", lifts, JOBS),
     "engines": ("lifts by a second engine", engines.engines_data, {}),
+    "certain": ("lifts of loads that never repeat", certain.certain_data, {}),
     "observation": ("Figs. 4–6", visible_items.observation_data, {}),
     "tuning": ("Figs. 8–10", tuning.tuning_data, JOBS),
     "training": ("Figs. 11 and 12", training.training_data, some(training.PAPER.cells)),

@@ -161,7 +161,7 @@ def left(policy: Policy, picks: int, seed: int) -> Load:
     for _ in range(picks):
         action = policy(observation[None], info["action_mask"][None], rng)[0]
         observation, *_, info = env.step(int(action))
-    load, present = env.physics.load, env.physics.present
+    load, present = env.load, env.present
     return Load(
         *(each[present] for each in (load.positions, load.sizes, load.packages, load.walls))
     )

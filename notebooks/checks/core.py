@@ -66,12 +66,13 @@ WEIGHTS = 1, 4, 16  # of z, in the slider
 def best_weight(weight):
     """The one of the weights of z with which the most of 128 visible items can be lifted."""
     load, physics = unload.stack_load(np.random.default_rng(1)), TablePhysics(shared_table())
-    physics.reset(load)
+    present = np.ones(len(load), bool)
 
     def share(each):
         distance = np.sqrt((task.VIEWPOINT - load.positions) ** 2 @ np.array([1, 0, each]))
         visible = np.argsort(distance, kind="stable")[:128].tolist()
-        return np.mean([physics.lift(item) >= task.LIFT_THRESHOLD for item in visible])
+        moved = np.array([physics.lift(load, present, item) for item in visible])
+        return np.mean(moved >= task.LIFT_THRESHOLD)
 
     return weight == max(WEIGHTS, key=share)
 

@@ -28,7 +28,8 @@ from unload.load.substacks import WALLS
 from unload.physics.bullet import ENGINES, SETTINGS
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
-from unload.physics.table import HELD_DOWN, LIFTS_FILE
+from unload.physics.situation import Surroundings
+from unload.physics.table import HELD_DOWN, LIFTS_FILE, LiftTable, TablePhysics
 from unload.support import files
 
 NAME = "lift_agreement"
@@ -133,7 +134,9 @@ def collect_lifts(lifts: int, seed: int) -> tuple[list[tuple[Load, np.ndarray]],
         The states, of each the load and (n,) bool, which items are left; and the columns of
         ``agreement_data`` without those of ``full`` but with ``state``, an index into the states.
     """
-    local, states, rows, names = LocalPhysics(ENGINES[0]), [], [], list(UNLOADED_BY)
+    shipped = TablePhysics(LiftTable.load(LIFTS_FILE, ENGINES[0]), exact=True)
+    asked = {"table": shipped, "local": LocalPhysics(ENGINES[0])}
+    states, rows, names = [], [], list(UNLOADED_BY)
     numbers: dict[bytes, int] = {}  # of situations
     rng = np.random.default_rng([seed, 2])
     while len(rows) < lifts:
@@ -146,22 +149,19 @@ def collect_lifts(lifts: int, seed: int) -> tuple[list[tuple[Load, np.ndarray]],
         for picks, (env, *_) in enumerate(played):
             if picks not in STAGES:
                 continue
-            table, visible = env.physics, env.visible
-            local.reset(table.load)
-            for item in np.flatnonzero(~table.present):
-                local.remove(item)
-            on_top = [len(local.surroundings.on_top(item)) for item in visible]
+            around, visible = Surroundings(env.load, env.present), env.visible
+            on_top = [len(around.on_top(item)) for item in visible]
             kinds = np.minimum(on_top, len(WANTED) - 1)
             for kind, wanted in enumerate(WANTED):
                 items = visible[kinds == kind]
                 for item in rng.choice(items, min(wanted, len(items)), replace=False).tolist():
-                    situation = local.surroundings.situation(item)
+                    situation = around.situation(item)
                     number = numbers.setdefault(situation.key, len(numbers))
                     row = {"picks": picks, "state": len(states), "item": item}
                     row |= {"on_top": situation.on_top, "situation": number}
-                    row |= {"table": table.lift(item), "local": local.lift(item)}
+                    row |= {name: each.simulate(situation) for name, each in asked.items()}
                     rows.append(named | row)
-            states.append((table.load, table.present.copy()))
+            states.append((env.load, env.present))
     return states, pd.DataFrame(rows)
 
 

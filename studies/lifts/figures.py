@@ -17,8 +17,7 @@ from studies.style import styled
 from unload import task
 from unload.drawing.picture import COLOURS
 from unload.physics.bullet import TIME_STEP, World, slim
-from unload.physics.local import LocalPhysics
-from unload.physics.situation import RESOLUTION, Situation
+from unload.physics.situation import RESOLUTION, Situation, Surroundings
 
 STICKS_OUT = 100  # μm, more than rounding
 END = 0.5  # m, beyond what any lift moves a box
@@ -61,17 +60,17 @@ def hard_situations(loads: int, seed: int) -> list[Situation]:
 
     Half of the free boxes are taken away at a time, until no more are left than are visible.
     """
-    rng, physics = np.random.default_rng(seed), LocalPhysics()
+    rng = np.random.default_rng(seed)
     found: dict[bytes, Situation] = {}
     for _ in range(loads):
-        physics.reset(unload.stack_load(rng))
-        while physics.present.sum() > task.N_VISIBLE:
-            present = np.flatnonzero(physics.present).tolist()
-            around = {item: physics.surroundings.situation(item) for item in present}
+        load = unload.stack_load(rng)
+        surroundings = Surroundings(load, np.ones(len(load), bool))
+        while surroundings.present.sum() > task.N_VISIBLE:
+            present = np.flatnonzero(surroundings.present).tolist()
+            around = {item: surroundings.situation(item) for item in present}
             found |= {each.key: each for each in around.values() if partly_on_top(each)}
             free = [item for item, each in around.items() if each.on_top == 0]
-            for item in rng.choice(free, len(free) // 2 + 1, replace=False):
-                physics.remove(item)
+            surroundings.present[rng.choice(free, len(free) // 2 + 1, replace=False)] = False
     return list(found.values())
 
 

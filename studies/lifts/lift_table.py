@@ -45,7 +45,7 @@ def _fill() -> dict[str, np.ndarray]:
     """The entries of an empty table that was filled by playing."""
     rng = np.random.default_rng(SEED)
     table = LiftTable(ENGINES[0])  # the reference, wherever this runs
-    envs = ContainerVectorEnv(task.NUM_ENVS, TablePhysics(table))
+    envs = ContainerVectorEnv(task.NUM_ENVS, TablePhysics(table, exact=True))
     jobs = list(product(range(EPISODES), _filling_policies(rng)))
     for _, policy in tqdm(jobs, unit="episode", ncols=100, file=sys.stdout):
         observations, infos = envs.reset(seed=int(rng.integers(2**31)))

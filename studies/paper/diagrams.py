@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch, Rectangle
 
 from studies.style import styled
-from unload import task
+from unload import ContainerEnv, task
 from unload.drawing.picture import package_colour, snapshot
 from unload.load.substacks import (
     CELL,
@@ -26,7 +26,6 @@ from unload.load.substacks import (
     PACKAGES,
     RIGHT,
 )
-from unload.physics.base import Physics
 
 INK = "#333333"
 PANELS = {"Agent": (19, "#eaf2f8"), "Environment": (1, "#f6f1e7")}  # lower edge, colour
@@ -91,9 +90,10 @@ def fig01_mdp() -> Figure:
 
 
 @styled
-def fig02_containers(containers: Sequence[Physics]) -> Figure:
+def fig02_containers(containers: Sequence[ContainerEnv]) -> Figure:
     """Containers as they are, one of them large; below each how many boxes have left it."""
-    images = np.stack([snapshot(each.load, each.present, each.positions()) for each in containers])
+    pictured = [(each.load, each.present, each.load.positions) for each in containers]
+    images = np.stack([snapshot(*each) for each in pictured])
     drawn = (images < 255).any(axis=(0, 3))  # beyond, all are white
     rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
     images = images[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]

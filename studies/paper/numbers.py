@@ -26,6 +26,7 @@ from unload.env.equalization import equalize
 from unload.load import substacks
 from unload.network.peq import PEQNetwork
 from unload.physics import bullet
+from unload.physics.situation import Surroundings
 
 CHANCE_ERROR = 0.025  # by how much a share may differ from one that the paper gives in 5 % steps
 CONTAINERS = 40  # full ones, whose free items and whose bars of Fig. 5 are counted
@@ -152,7 +153,7 @@ def full_containers(count: int) -> pd.DataFrame:
     rows = []
     for seed in range(count):
         env.reset(seed=seed)
-        positions, on_top = env.observed_positions(), env.physics.surroundings.on_top
+        positions, on_top = env.observed_positions(), Surroundings(env.load, env.present).on_top
         x = observation.scale(positions)[:, 0]
         distance = (task.VIEWPOINT - positions) ** 2 @ (1, 0, 1)
         seen = {"bar": env.visible, "bar_1": distance.argsort(kind="stable")[: task.N_VISIBLE]}

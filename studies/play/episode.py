@@ -87,7 +87,7 @@ class Episode:
         self._options = {} if load is None else {"load": load}
         self._seed = seed
         self._begin()
-        self.load = self._env.physics.load
+        self.load = self._env.load
 
     def _begin(self) -> None:
         self._now = self._env.reset(seed=self._seed, options=self._options)
@@ -99,7 +99,7 @@ class Episode:
         """Keep the moment after a pick."""
         visible = self.visible
         failed = np.sort(visible[self.allowed()[: len(visible)] == 0])
-        self._moments.append(Moment(self._env.physics.present.copy(), visible, failed, pick))
+        self._moments.append(Moment(self._env.present, visible, failed, pick))
 
     @property
     def observation(self) -> np.ndarray:
@@ -122,7 +122,7 @@ class Episode:
     def pick(self, item: int) -> Pick:
         """Lift a visible item."""
         row = self._env.visible.tolist().index(item)
-        on_top = tuple(Surroundings(self.load, self._env.physics.present).on_top(item))
+        on_top = tuple(Surroundings(self.load, self._env.present).on_top(item))
         deadlocked = bool(self.allowed()[row] == 0)
         observation, reward, _, _, info = self._env.step(row)
         self._now = observation, info
@@ -143,12 +143,9 @@ class Episode:
 
     def liftable(self, count: int | None = None) -> np.ndarray:
         """(k,) int64, the visible items that could be unloaded after the first ``count`` picks."""
-        moment = self.moment(count)
-        physics = TablePhysics(shared_table())
-        physics.reset(self.load)
-        for item in np.flatnonzero(~moment.present):
-            physics.remove(item)
-        moved = np.array([physics.lift(item) for item in moment.visible])
+        moment, physics = self.moment(count), TablePhysics(shared_table())
+        here = self.load, moment.present
+        moved = np.array([physics.lift(*here, item) for item in moment.visible])
         return moment.visible[moved >= task.LIFT_THRESHOLD]
 
     def unloaded(self, count: int | None = None) -> int:

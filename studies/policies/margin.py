@@ -58,7 +58,7 @@ def containers(
 def pairs_in_sight(env: ContainerEnv) -> np.ndarray:
     """Rows of visible boxes with visible ones on them, and the rows of those, (2, pairs)."""
     row = {item: number for number, item in enumerate(env.visible.tolist())}
-    contacts, present = env.physics.load.contacts, env.physics.present
+    contacts, present = env.load.contacts, env.present
     pairs = [
         (row[item], row[above])
         for item in row

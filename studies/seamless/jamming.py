@@ -125,14 +125,14 @@ def weigh(run: Training, z: float) -> None:
         z: the last entry of W's diagonal; 4 in the paper.
     """
     envs = run.rollout.envs.unwrapped
-    weights, put = task.DISTANCE_WEIGHTS * [1, 1, z / task.DISTANCE_WEIGHTS[2]], envs._put_load
+    weights, show = task.DISTANCE_WEIGHTS * [1, 1, z / task.DISTANCE_WEIGHTS[2]], envs._show
 
-    def put_in_order(env: int, load, blur: np.ndarray) -> None:
-        put(env, load, blur)
-        distances = (task.VIEWPOINT - load.positions - blur) ** 2 @ weights
+    def show_in_order(env: int, items: np.ndarray, positions: np.ndarray, load) -> None:
+        show(env, items, positions, load)
+        distances = (task.VIEWPOINT - positions) ** 2 @ weights
         order = np.argsort(distances, kind="stable")
         envs._containers.by_distance[env, : len(load)] = order
         containers.show_nearest(envs._containers, env, *envs._how_observed)
 
-    envs._put_load = put_in_order
+    envs._show = show_in_order
     run.rollout._observe(*envs.reset(seed=run.config.seeds()[0]))

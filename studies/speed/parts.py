@@ -18,6 +18,7 @@ from unload import task
 from unload.agent import learner
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
+from unload.physics.situation import Surroundings
 from unload.physics.table import TablePhysics
 
 CONTAINER = "unload/Container-v0"
@@ -49,14 +50,16 @@ def best_times(calls: Mapping[str, Callable[[], object]]) -> dict[str, float]:
 def lift_rates(load: unload.Load) -> dict[str, float]:
     """Lifts per second in a full container, all known to the table, by physics."""
     items = np.random.default_rng(0).permutation(len(load)).tolist()
-    answering = {"full": FullPhysics(), "local": LocalPhysics(), "table": TablePhysics()}
-    for physics in answering.values():
-        physics.reset(load)
+    full, local, table = FullPhysics(), LocalPhysics(), TablePhysics()
+    full.reset(load)
+    situation = Surroundings(load, np.ones(len(load), bool)).situation
+    lift = {
+        "full": full.lift,
+        "local": lambda item: local.simulate(situation(item)),
+        "table": lambda item: table.simulate(situation(item)),
+    }
     times = best_times(
-        {
-            name: lambda name=name, physics=physics: list(map(physics.lift, items[: LIFTS[name]]))
-            for name, physics in answering.items()
-        }
+        {name: lambda name=name: list(map(lift[name], items[: LIFTS[name]])) for name in LIFTS}
     )
     return {name: LIFTS[name] / seconds for name, seconds in times.items()}
 

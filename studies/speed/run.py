@@ -1,6 +1,6 @@
 """How fast the parts are: measured, printed and kept in ``data/speeds.csv``.
 
-    python -m studies.speed.run            in about five minutes
+    python -m studies.speed.run            in about seven minutes
 
 Absolute times depend on the machine and on what else it does; the ratios, each to the
 first row of its kind and all of one run, say more. All is on one thread unless said.
@@ -20,6 +20,7 @@ import pandas as pd
 import torch
 
 import unload
+from studies.lifts.own_loads import FAMILIES
 from studies.policies.sb3 import containers, dqn
 from studies.results import measured, publish
 from studies.speed.parts import lift_rates, pick_rates, three_digits, update_times
@@ -30,6 +31,7 @@ COMMAND = "python -m studies.speed.run"
 # Picks that count, of ours with the fused update, of ours with plain PyTorch's, and of theirs.
 FUSED, PLAIN, THEIRS = 256_000, 3_200, 960
 NEW = 25_600  # of ours on loads that never repeat, with as many before that do not count
+WHOLE, ROUNDS = 64_000, 2  # picks of a whole training, and how many there are by each kind of load
 THREADS = {1: "1 thread", 2: "2 threads"}
 
 
@@ -58,6 +60,25 @@ def training_rates() -> dict[str, float]:
     rates[name] = _our_rate(NEW, 2, NEW, new_load, epsilon_final=1.0)
     torch.set_num_threads(1)
     return rates
+
+
+def load_rates() -> dict[str, float]:
+    """Picks per second of the processor's time in whole trainings at b = 256, by their loads.
+
+    One thread. The families never repeat a load, so PyBullet simulates what no rule answers. All
+    take turns, in each round with other seeds, and the fastest round counts.
+    """
+    stacks: dict[str, Callable | None] = {"the paper's": None, **FAMILIES}
+    torch.set_num_threads(1)
+    seconds: dict[str, list[float]] = {name: [] for name in stacks}
+    for seed in range(ROUNDS):
+        config = unload.TrainConfig(picks=WHOLE, batch_size=256, seed=seed)
+        for name, stack in stacks.items():
+            with tempfile.TemporaryDirectory() as folder:
+                start = time.process_time()
+                unload.train(config, folder, progress=False, stack=stack)
+                seconds[name].append(time.process_time() - start)
+    return {name: WHOLE / min(each) for name, each in seconds.items()}
 
 
 def new_load(rng: np.random.Generator) -> unload.Load:
@@ -108,6 +129,7 @@ def speeds() -> pd.DataFrame:
         ("random picks", "picks/s", pick_rates),
         ("update, b = 2048, n = 64", "ms", update_times),
         ("training", "picks/s", training_rates),
+        ("training at b = 256, by loads", "picks/s", load_rates),
     )
     rows = []
     for what, unit, measure in parts:

@@ -12,6 +12,7 @@ from tests.env.comparing import CONTAINER, HIGHEST, assert_same, make_env
 from unload import ContainerEnv, HighestItemEnv, stack_load
 from unload.env.highest_item import HighestItemVectorEnv
 from unload.env.vector import ContainerVectorEnv
+from unload.physics.full import FullPhysics
 
 
 def container(**kwargs) -> ContainerEnv:
@@ -29,9 +30,14 @@ ALL = [container, HighestItemEnv, ContainerVectorEnv, HighestItemVectorEnv]
         (container, {"max_picks": 2**63}, ValueError, "max_picks is 9223372036854775808; .* <= "),
         (HighestItemEnv, {"position_noise": 1e300}, ValueError, r"is 1e\+300; .*\[0, 10.0\]"),
         (ContainerEnv, {"render_mode": "human"}, ValueError, "render_mode is 'human'"),
-        (ContainerEnv, {"physics": "mujoco"}, ValueError, "physics is 'mujoco'; expected one of"),
+        (ContainerEnv, {"physics": "mujoco"}, ValueError, "physics is 'mujoco'; expected 'local'"),
         (ContainerVectorEnv, {"num_envs": 0}, ValueError, "num_envs is 0"),
-        (ContainerVectorEnv, {"physics": "local"}, ValueError, "physics is 'local'; expected"),
+        (
+            ContainerVectorEnv,
+            {"physics": FullPhysics()},
+            TypeError,
+            "a LocalPhysics, whose simulate",
+        ),
         (ContainerEnv, {"stack": 3}, TypeError, "stack is 3"),
         (ContainerVectorEnv, {"render_mode": "rgb_array"}, ValueError, "expected one of None"),
     ],

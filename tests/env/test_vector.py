@@ -1,5 +1,7 @@
 """The array environments, against Gymnasium's loop over plain ones."""
 
+from unittest.mock import Mock
+
 import gymnasium
 import numpy as np
 import pytest
@@ -9,6 +11,10 @@ from gymnasium.vector import AutoresetMode
 import unload
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, few_items, make_pair
 from tests.load.walls import crossed_bars, own_load
+from unload import plain
+from unload.env.vector import ContainerVectorEnv
+from unload.physics.local import LocalPhysics
+from unload.physics.table import LiftTable, TablePhysics
 
 
 def play_both(
@@ -82,6 +88,29 @@ def test_containers_and_boxes_of_other_sizes_stand_side_by_side(kind):
     play_both(CONTAINER, 3, 60, seed=3, max_picks=20, stack=stack)
 
 
+def test_side_walls_and_viewpoint_are_those_of_the_loads_container():
+    """A load of the paper, made wider and higher along with its container."""
+
+    class Sides(LocalPhysics):
+        def simulate(self, situation) -> float:
+            return len(situation.sides) / 100
+
+    neat, scale = unload.build_load(np.zeros((1, 3, 4), int)), np.array([0.9, 1.3, 1.6])
+    load = unload.Load(scale * neat.positions, scale * neat.sizes, container=scale * neat.container)
+    envs = ContainerVectorEnv(1, Sides(), position_noise=0.0)
+    envs.reset(options={"load": load})
+    items = envs.visible[0, : len(load)]
+    rows = [envs.step([row])[4] for row in range(len(items))]
+    sides = [len(plain.situation(load, np.ones(len(load), bool), item).sides) for item in items]
+    assert [round(100 * infos["distance"][0]) for infos in rows] == sides
+    assert {0, 1} == {*sides}
+
+    # Nearest is what is nearest to the middle of the entrance's upper edge (Sec. III-B).
+    offset = load.positions - load.container * (1, 0.5, 1)
+    distance = np.sqrt(offset[:, 0] ** 2 + 4 * offset[:, 2] ** 2)
+    assert (np.diff(distance[items]) > -1e-9).all()
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_random_actions_seeds_and_options(seed):
     rng = np.random.default_rng(seed)
@@ -120,6 +149,47 @@ def test_episodes_that_end_at_different_steps(kwargs):
     assert terminated.any() and truncated.any()
     together = (terminated | truncated).sum(axis=1)
     assert {0, 1} < set(together.tolist())
+
+
+@pytest.mark.parametrize("physics", [None, TablePhysics(LiftTable())])
+def test_known_lifts_are_looked_up_by_the_compiled_loop(physics, monkeypatch):
+    """Which changes no bit if it is missing, but a run takes twice as long."""
+    envs = ContainerVectorEnv(4, *(() if physics is None else (physics,)))
+    actions = np.random.default_rng(0).integers(128, size=(100, 4))
+
+    def play() -> list:
+        return [envs.reset(seed=0), *map(envs.step, actions)]
+
+    first = play()
+    asked = Mock(side_effect=AssertionError("the table knows it"))
+    monkeypatch.setattr(TablePhysics, "simulate", asked)
+    assert_same(play(), first)
+
+
+def test_places_alone_say_what_is_free(monkeypatch):
+    monkeypatch.setattr(TablePhysics, "simulate", Mock(side_effect=AssertionError))
+    envs = ContainerVectorEnv(1, "places", stack=lambda rng: own_load(rng, "continuous sizes"))
+    envs.reset(seed=0)
+    load, items = own_load(np.random.default_rng(0), "continuous sizes"), envs.visible[0]
+    free = ~load.covered(np.ones(len(load), bool))[items]
+    assert_same(envs.liftable()[0], free)
+    assert 5 < free.sum() < 120
+    single = unload.ContainerEnv("places", stack=envs.stack)
+    single.reset(seed=0)
+    monkeypatch.undo()
+    assert (single.liftable() == free).all()
+    assert single.step(int(free.argmin()))[4]["distance"] == 0
+
+
+def test_another_physics_is_asked_about_each_pick_that_has_not_failed():
+    class Gripper(TablePhysics):
+        def simulate(self, situation) -> float:
+            return 0.1
+
+    envs = ContainerVectorEnv(2, Gripper())
+    envs.reset(seed=0)
+    for _ in range(2):
+        assert envs.step(np.array([3, 5]))[4]["distance"].tolist() == [0.1, 0.1]
 
 
 def test_an_episode_that_is_over_waits_for_its_reset():

@@ -1,6 +1,7 @@
 """A load: which boxes it accepts, and what it keeps of them."""
 
 import sys
+from contextlib import nullcontext
 from dataclasses import FrozenInstanceError
 
 import numpy as np
@@ -8,7 +9,15 @@ import pytest
 
 from tests.load.walls import KINDS, crossed_bars, of_corners, own_load
 from unload import task
-from unload.load.boxes import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE, Load, _find_contacts
+from unload.load.boxes import (
+    ABOVE,
+    BELOW,
+    BESIDE,
+    CONTACT_TOLERANCE,
+    Load,
+    _find_contacts,
+    check_no_overhang,
+)
 
 FIELDS = ("positions", "sizes", "packages", "walls")
 
@@ -100,6 +109,16 @@ def test_packages_and_walls_follow_from_the_boxes(full_load):
     assert (load.walls == full_load.walls).all()
     pairs = {*zip(load.packages.tolist(), full_load.packages.tolist())}
     assert len(pairs) == len({*load.packages.tolist()}) == len({*full_load.packages.tolist()})
+
+
+def test_what_shares_less_than_the_tolerance_of_a_contact_hangs_over_nothing():
+    """A box on another one, and next to it a lower one, into which it reaches by so much."""
+    for share, refused in ((0.5, False), (2.0, True)):
+        reach = share * CONTACT_TOLERANCE
+        corners = [(0, 0, 0), (0, 0, 1), (0, 1, 0)]
+        load = of_corners(corners, [(1, 1, 1), (1, 1 + reach, 0.5), (1, 0.5, 0.8)])
+        with pytest.raises(ValueError, match="1 hangs over 2") if refused else nullcontext():
+            check_no_overhang(load)
 
 
 def test_the_container_is_the_papers_or_ones_own():

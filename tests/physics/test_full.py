@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from tests.physics.test_base import ONE_BOX, lifts, make
+from tests.physics.test_local import ONE_BOX, lifts, make
 from unload import Load, task
 from unload.load.substacks import build_load
+from unload.physics.full import FullPhysics
 
 pytestmark = pytest.mark.pybullet
 
@@ -24,7 +25,30 @@ def test_what_a_full_lift_leaves_behind(boxes, after_pick, item, restored):
     assert (physics.lift(item) >= task.LIFT_THRESHOLD) == (item == 2)
     moved = np.abs(physics.positions() - load.positions).max()
     assert moved == 0 if restored else moved > 0.005
-    assert physics.restores == (after_pick == "restore")
+
+
+@pytest.mark.parametrize("call", ["lift", "remove"])
+def test_bad_items_are_refused(boxes, call):
+    physics = make("full", boxes((1.2, 0.2), (2.0, 0.2)))
+    physics.remove(1)
+    for item, message in ((1, "item 1 has been removed"), (2, "item is 2; .* >= 0 and <= 1")):
+        with pytest.raises(ValueError, match=message):
+            getattr(physics, call)(item)
+    assert physics.present.tolist() == [True, False]
+
+
+def test_nothing_is_asked_of_a_container_that_is_not_filled(boxes):
+    physics, load = FullPhysics(), boxes((1.2, 0.2))
+    calls = [lambda: physics.lift(0), lambda: physics.remove(0), physics.positions]
+    calls += [lambda: physics.settle(0.1)]
+    for _ in range(2):
+        for call in calls:
+            with pytest.raises(RuntimeError, match="the physics holds no load; call reset first"):
+                call()
+        physics.reset(load)
+        assert (physics.positions() == load.positions).all()
+        physics.close()
+        physics.close()
 
 
 def test_a_restored_full_world_repeats_its_answers():

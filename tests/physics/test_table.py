@@ -2,14 +2,16 @@
 
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from tests.load.walls import KINDS, own_load
+from unload import task
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Situation, Surroundings
-from unload.physics.table import FREE_LIFT, HELD_DOWN, LIFTS_FILE, LiftTable
+from unload.physics.table import FREE_LIFT, HELD_DOWN, LIFTS_FILE, LiftTable, TablePhysics
 from unload.support import files
 
 
@@ -25,6 +27,61 @@ def test_every_box_with_nothing_on_top_moves_equally_far(kind, rng):
             if not around.on_top(item) and asked < 500:
                 assert local.simulate(around.situation(item)) == FREE_LIFT
                 asked += 1
+
+
+SIDE = 400_000  # µm, edges of the boxes of a pile
+
+
+def pile(*centres: tuple[float, float], floor: int | None = None, sides=()) -> Situation:
+    """A cube and others on it, whose centres are given in its half edges, along x and y."""
+    places = [(x * SIDE / 2, y * SIDE / 2, SIDE) for x, y in centres]
+    boxes = np.array([(*place, SIDE, SIDE, SIDE) for place in [(0, 0, 0), *places]], np.int32)
+    return Situation(boxes, len(boxes), floor, sides)
+
+
+@pytest.mark.parametrize("floor", [None, -SIDE // 2])
+@pytest.mark.parametrize("sides", [(), (-SIDE,), (-SIDE, SIDE)])
+@pytest.mark.parametrize(
+    ("centres", "held"),
+    [
+        ([(0.49, -0.49)], True),
+        ([(0.51, 0)], False),
+        ([(0, -0.51)], False),
+        ([(1.99, 0), (-0.6, 0.7)], True),
+        ([(2.01, 0), (-0.9, 0)], False),
+        ([(0.5, 1.6), (-0.5, -0.05)], False),
+    ],
+    ids=str,
+)
+def test_boxes_on_the_middle_hold_a_box_down_without_a_simulation(
+    centres, held, floor, sides, monkeypatch
+):
+    asked = Mock(return_value=0.123)
+    monkeypatch.setattr(LocalPhysics, "_pull", asked)
+    situation = pile(*centres, floor=floor, sides=sides)
+    assert TablePhysics().simulate(situation) == (0.0 if held else 0.123)
+    assert asked.called != held
+    assert TablePhysics(exact=True).simulate(situation) == 0.123
+    known = LiftTable()
+    known.add(situation, 0.3)
+    assert TablePhysics(known).simulate(situation) == 0.3, "the table comes first"
+    assert TablePhysics(known, held_down=1).simulate(situation) == 0, "it lies on another one"
+
+
+@pytest.mark.parametrize("engine", [pytest.param("pybullet", marks=pytest.mark.pybullet), "mujoco"])
+def test_what_is_given_up_half_way_fails_and_what_goes_on_has_the_same_bits(engine):
+    """Boxes of layered walls under one or two others that do not lie on their middle."""
+    rng, local, said = np.random.default_rng(5), LocalPhysics(engine), []
+    load = own_load(rng, "continuous sizes")
+    around = Surroundings(load, rng.random(len(load)) < 0.6)
+    for item in np.flatnonzero(around.present).tolist():
+        situation, table = around.situation(item), LiftTable(engine)
+        answer = TablePhysics(table).simulate(situation)
+        if len(table) and len(said) < 30:  # it was simulated
+            distance = local.simulate(situation)
+            assert answer == distance or (answer == 0 and distance < task.LIFT_THRESHOLD)
+            said.append(answer)
+    assert 3 < said.count(0.0) < len(said) - 3
 
 
 @pytest.mark.pybullet

@@ -1,5 +1,7 @@
 """Results that rest on training are of today's training."""
 
+from functools import partial
+
 import pytest
 import torch
 
@@ -15,9 +17,9 @@ from unload.support import files
 
 # Folders and files of data/ that rest on no training of the container's agent.
 NOT_TRAINED = {
-    "engines", "engines_msr", "heap", "lift_agreement", "obs_hist_equal", "policies", "sb3",
-    "seamless/jam_episodes", "seamless/jams", "seamless/mujoco_jams", "speeds", "ties/earlier",
-    "ties/leak", "ties/noise",
+    "certain_lifts", "engines", "engines_msr", "heap", "lift_agreement", "obs_hist_equal",
+    "policies", "sb3", "seamless/jam_episodes", "seamless/jams", "seamless/mujoco_jams", "speeds",
+    "ties/earlier", "ties/leak", "ties/noise",
 }  # fmt: skip
 
 
@@ -40,11 +42,15 @@ def test_data_is_of_todays_training():
 
 
 def test_other_lifts_are_of_other_physics(monkeypatch):
-    monkeypatch.setattr(fingerprint, "LIFTED", {TablePhysics: 1, LocalPhysics: 12, FullPhysics: 90})
+    lifted = zip(fingerprint.LIFTED, (1, 12, 90))
+    monkeypatch.setattr(fingerprint, "LIFTED", dict(lifted))
     found = {physics_fingerprint.__wrapped__()}
     assert found == {physics_fingerprint.__wrapped__()}
-    others = [(table, "HELD_DOWN", 2), (table, "HELD_DOWN", 4), (table, "FREE_LIFT", 0.1)]
-    others += [(kind, "lift", lambda self, item: 0.1) for kind in (LocalPhysics, FullPhysics)]
+    others = [(table, "FREE_LIFT", 0.1)]
+    for held_down in (2, 4):
+        exact = partial(TablePhysics, exact=True, held_down=held_down)
+        others.append((fingerprint, "LIFTED", {exact: 1, LocalPhysics: 12, FullPhysics: 90}))
+    others += [(kind, "lift", lambda self, *item: 0.1) for kind in (LocalPhysics, FullPhysics)]
     for owner, name, other in others:
         with monkeypatch.context() as patch:
             patch.setattr(owner, name, other)

@@ -42,7 +42,7 @@ def test_paper_makes_every_part(called):
     calls = called("paper", "--jobs", "3")
     assert [name for name, _ in calls] == list(command.PARTS)
     for name, given in calls:
-        assert given == ({} if name in ("observation", "engines") else {"n_jobs": 3})
+        assert given == ({} if name in ("observation", "engines", "certain") else {"n_jobs": 3})
 
 
 def test_what_nothing_can_run_with_is_refused_in_one_line(called, capsys):

@@ -8,6 +8,7 @@ import pytest
 import torch
 
 import unload
+from studies.lifts.own_loads import FAMILIES
 from studies.policies.sb3 import containers, dqn
 from studies.results import read_provenance, read_table
 from studies.speed import parts, run
@@ -66,6 +67,20 @@ def test_training_is_timed_where_it_counts(monkeypatch):
     assert torch.get_num_threads() == 1
 
 
+def test_whole_trainings_take_turns_by_their_loads(monkeypatch):
+    """Made-up ones, the first of which takes 9 seconds and each other one 2."""
+    ours, stacks = [], [None, *FAMILIES.values()]
+
+    def train(config, folder, progress, stack):
+        ours.append((config.seed, config.batch_size, stack))
+
+    ticks = [0, 9, *[0, 2] * (run.ROUNDS * len(stacks) - 1)]
+    monkeypatch.setattr(run, "time", SimpleNamespace(process_time=iter(ticks).__next__))
+    monkeypatch.setattr(unload, "train", train)
+    assert run.load_rates() == dict.fromkeys(["the paper's", *FAMILIES], run.WHOLE / 2)
+    assert ours == [(seed, 256, stack) for seed in range(run.ROUNDS) for stack in stacks]
+
+
 def test_each_update_that_is_timed_is_what_it_is_called(set_in):
     seen = {}
 
@@ -94,8 +109,9 @@ def test_speeds_are_printed_and_published_with_ratios(own_data, set_in, capsys):
     set_in(run, pick_rates=lambda: {"one": 4.0})
     set_in(run, update_times=lambda: {"PyTorch": 8.0, "fused": 2.0})
     set_in(run, training_rates=lambda: {"theirs": 5.0, "here": 4.0})
+    set_in(run, load_rates=lambda: {"the paper's": 4.0, "columns": 2.0})
     run.main()
-    assert read_table("speeds")["ratio"].tolist() == [1, 6172.5, 1, 1, 4, 1, 0.8]
+    assert read_table("speeds")["ratio"].tolist() == [1, 6172.5, 1, 1, 4, 1, 0.8, 1, 0.5]
     said = capsys.readouterr()
     assert "12,300 lifts/s 6,170 ×" in said.out and "measuring: training" in said.err
     assert read_provenance("speeds")["runs"] == 1

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable
 from contextlib import closing
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -17,8 +17,9 @@ from unload.env.observation import POSITION_NOISE
 from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import Load
 from unload.load.substacks import stack_load
-from unload.physics.base import Physics
-from unload.physics.full import PhysicsName
+from unload.physics.full import FullPhysics
+from unload.physics.local import LocalPhysics
+from unload.physics.table import PhysicsName
 from unload.support import checks
 
 MOST_EPISODES = 10**6
@@ -45,7 +46,7 @@ def evaluate(
     policy: Policy,
     episodes: int = 20,
     seed: int = 0,
-    physics: PhysicsName | Physics = "table",
+    physics: Literal["full"] | PhysicsName | LocalPhysics | FullPhysics = "table",
     mask: bool = True,
     max_picks: int | None = task.MAX_PICKS,
     equalize: bool = False,
@@ -65,7 +66,7 @@ def evaluate(
             number, the physics, and how many are played at once: a policy that draws is asked
             about one episode at a time, each with a generator of its own.
         physics: see ``ContainerEnv``. ``"table"`` plays 64 episodes side by side, the others
-            one after the other; one of your own is not closed.
+            one after the other.
         mask: whether the policy's masks exclude items that failed since the last success.
             Rows without an item are always excluded.
         max_picks: most picks per episode; fewer if the container is empty before, or if the

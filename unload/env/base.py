@@ -52,11 +52,6 @@ class InOrder:
 
     _state = "not started"
 
-    def __reduce_ex__(self, protocol):
-        """Refuse to be copied or pickled, because both would step the same simulator."""
-        kind = type(self).__name__
-        raise TypeError(f"a {kind} cannot be copied or pickled; make another one with {kind}(...)")
-
     def _check_open(self) -> None:
         if self._state == "closed":
             raise ClosedEnvironmentError("the environment is closed; make a new one")
@@ -166,13 +161,8 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
             rng if rng is not None and (one is None or not new) else seeding.np_random(one)[0]
             for one, new, rng in zip(seeds, chosen, self._rngs or [None] * self.num_envs)
         ]
-        return self._restart(chosen, rngs, options)
-
-    def _restart(self, where: np.ndarray, rngs: list[np.random.Generator], options: dict):
-        """``reset`` some environments, (num_envs,) bool, by the generators of all."""
-        self._begin(where, rngs, **options)
-        self._rngs, self._state = rngs, "running"
-        return self._copy_observations(), _flagged(self._infos(), where)
+        self._begin(chosen, rngs, **options)
+        return self._copy_observations(), _flagged(self._infos(), chosen)
 
     def step(self, actions: np.ndarray):
         """Pick row ``actions[i]``, (num_envs,) int, in environment i.
@@ -181,26 +171,27 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         ``SAME_STEP``, ``infos["final_obs"]`` and ``infos["final_info"]`` hold the last ones then.
         """
         self._check_started()
-        # Environments whose episode has ended without a reset; with SAME_STEP there are none.
-        needs_reset = self._emptied() | (self._picks == self.max_picks)
-        if needs_reset.any() and self.autoreset_mode is AutoresetMode.DISABLED:
+        # Where the episode was over before this step. With SAME_STEP there are none.
+        over = self._emptied() | (self._picks == self.max_picks)
+        if over.any() and self.autoreset_mode is AutoresetMode.DISABLED:
             raise ResetNeeded("an episode is finished; call reset with a reset_mask first")
         last_row = task.N_VISIBLE - 1
         actions = checks.integer_array("actions", actions, (self.num_envs,), last_row)
 
         self._state = "broken off"  # until all is done
-        rewards, picked = self._pick(actions, ~needs_reset)
+        rewards, picked = self._pick(actions, ~over)
         self._picks += 1
-        if needs_reset.any():
-            rewards[needs_reset] = 0
-            self._begin(needs_reset, self._rngs)
+        if over.any():  # NEXT_STEP: the next one begins instead of a pick
+            rewards[over] = 0
+            self._begin(over, self._rngs)
         terminations, truncations = self._emptied(), self._picks == self.max_picks
 
-        # What the last pick of an episode showed goes aside, as Gymnasium wants it.
+        # Where it ended by this pick. With SAME_STEP the next one begins at once, and what the last
+        # pick showed goes aside, as Gymnasium wants it.
         final: dict[str, Any] = {}
-        ended, just_reset = terminations | truncations, needs_reset
+        ended, begun = terminations | truncations, over
         if ended.any() and self.autoreset_mode is AutoresetMode.SAME_STEP:
-            last, just_reset = self._copy_observations(), ended
+            last, begun = self._copy_observations(), ended
             observations = np.full(self.num_envs, None)
             for env in np.flatnonzero(ended):
                 observations[env] = last[env]
@@ -211,8 +202,8 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
 
         # The infos are the reset's where an episode has begun, and the pick's elsewhere.
         infos = _flagged(self._infos(), np.ones(self.num_envs, bool))
-        if not just_reset.all():  # a reset has no infos about a pick
-            infos |= _flagged(picked, ~just_reset)
+        if not begun.all():  # a reset has no infos about a pick
+            infos |= _flagged(picked, ~begun)
         self._state = "running"
         return self._copy_observations(), rewards, terminations, truncations, infos | final
 
@@ -227,6 +218,7 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         self._picks[where] = 0
         envs = np.flatnonzero(where)
         self._fill(envs, [rngs[env] for env in envs], **options)
+        self._rngs, self._state = rngs, "running"
 
     def close_extras(self, **kwargs) -> None:
         """Free what the environments hold."""
@@ -305,9 +297,8 @@ class PickingEnv(EpisodeEnv):
         self._check_open()
         options = check_options(options, self._envs.options)
         super().reset(seed=seed)
-        everywhere = np.ones(1, bool)
-        observations, infos = self._envs._restart(everywhere, [self.np_random], options)
-        return observations[0], _first(infos)
+        self._envs._begin(np.ones(1, bool), [self.np_random], **options)
+        return self._envs._copy_observations()[0], _first(self._envs._infos())
 
     def step(self, action: int):
         """Pick row ``action`` of the observation."""

@@ -1,20 +1,21 @@
 """The container as a Gymnasium environment (Sec. III-A to III-D)."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from unload import task
 from unload.env.base import PickingEnv
+from unload.env.full import FullContainer
 from unload.env.observation import POSITION_NOISE
-from unload.env.vector import ContainerVectorEnv
+from unload.env.vector import OneContainer
 from unload.load.boxes import Load
 from unload.load.substacks import stack_load
-from unload.physics.base import Physics
-from unload.physics.full import PhysicsName, make_physics
-from unload.support import checks
+from unload.physics.full import FullPhysics
+from unload.physics.local import LocalPhysics
+from unload.physics.table import PhysicsName
 
 
 class ContainerEnv(PickingEnv):
@@ -79,14 +80,15 @@ class ContainerEnv(PickingEnv):
         physics: what is simulated at a lift: ``"local"`` (the situation of the chosen box),
             ``"full"`` (every box: seconds a pick) or ``"table"`` (``"local"``, remembered), which
             answers without a simulation if nothing rests on the chosen box (it moves by
-            0.463053 m) or if three boxes or more do (0 m). Or a ``Physics`` of your
-            own, such as ``FullPhysics("keep")``, which the environment leaves open.
+            0.463053 m), if three boxes or more do, or one or two on its middle (0 m); or
+            ``"places"``, which says that whatever has a box on it is held down. Or a
+            ``LocalPhysics`` of your own, or a ``FullPhysics``, whose container is filled.
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
         max_picks: greatest length of an episode.
         position_noise: standard deviation of that noise in m, at most 10; with 0 the boxes are not
-            lowered by 1 mm either. A physics that does not restore boxes after a lift has no such
-            noise, because its boxes drift: they are seen where they are.
+            lowered by 1 mm either. Boxes of ``FullPhysics("keep")`` have no such noise, because
+            they drift: they are seen where they are.
         stack: makes a ``Load``, of any number of items and in a container of any size, from a
             ``numpy.random.Generator``. Each box stands on the floor or, within the load's
             ``contact_tolerance``, on another one: across a wider gap it would not hold it down.
@@ -94,9 +96,10 @@ class ContainerEnv(PickingEnv):
         render_mode: ``"rgb_array"`` for pictures, or None.
 
     Attributes:
+        load: the load of this episode.
+        present: (n,) bool, which of its items have not been unloaded.
         visible: (128,) int64, the item in each row of the observation, -1 in rows without.
-        physics: what lifts; it has the ``load``, and which of its items are ``present``. Another
-            one may be put here before a reset, and is left open, too.
+        physics: what lifts.
 
     Raises:
         TypeError, ValueError: an argument, an action or a load is not as described.
@@ -106,11 +109,11 @@ class ContainerEnv(PickingEnv):
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
-    _envs: "_OneContainer"
+    _envs: OneContainer
 
     def __init__(
         self,
-        physics: PhysicsName | Physics = "local",
+        physics: Literal["full"] | PhysicsName | LocalPhysics | FullPhysics = "local",
         equalize: bool = False,
         ties: str = "noise",
         max_picks: int = task.MAX_PICKS,
@@ -118,23 +121,33 @@ class ContainerEnv(PickingEnv):
         stack: Callable[[np.random.Generator], Load] = stack_load,
         render_mode: str | None = None,
     ) -> None:
-        settings = {"equalize": equalize, "ties": ties, "max_picks": max_picks}
+        settings: dict[str, Any] = {"equalize": equalize, "ties": ties, "max_picks": max_picks}
         settings |= {"position_noise": position_noise, "stack": stack}
-        super().__init__(_OneContainer(physics, settings), render_mode)
+        settings |= {"autoreset_mode": AutoresetMode.DISABLED}
+        envs: OneContainer
+        if isinstance(physics, FullPhysics) or physics == "full":
+            envs = FullContainer(FullPhysics() if isinstance(physics, str) else physics, settings)
+        else:
+            envs = OneContainer(1, physics, **settings)
+        super().__init__(envs, render_mode)
+
+    @property
+    def load(self) -> Load:
+        self._check_started()
+        return self._envs.load
+
+    @property
+    def present(self) -> np.ndarray:
+        self._check_started()
+        return self._envs.present
 
     @property
     def visible(self) -> np.ndarray:
         return self._envs.visible[0].astype(np.int64)
 
     @property
-    def physics(self) -> Physics:
+    def physics(self) -> LocalPhysics | FullPhysics:
         return self._envs.physics
-
-    @physics.setter
-    def physics(self, physics: Physics) -> None:
-        checks.instance("physics", physics, Physics, "a Physics")
-        self._envs.close_physics()
-        self._envs.physics, self._envs.lent = physics, True
 
     def liftable(self) -> np.ndarray:
         """(128,) bool, which rows of the observation can be unloaded now.
@@ -142,15 +155,12 @@ class ContainerEnv(PickingEnv):
         Where the physics is not restored after a pick, asking would change the container, and is a
         ValueError.
         """
-        self._check_started()
-        if not self.physics.restores:
-            raise ValueError("lifts move other boxes; expected a physics that restores them")
         return self._envs.liftable()[0]
 
     def observed_positions(self) -> np.ndarray:
         """(n, 3) float64, where all items of the load are seen to be, in m."""
         self._check_started()
-        return self._envs.observed_positions()
+        return self._envs.seen.copy()
 
     def render(self) -> np.ndarray | None:
         """(480, 640, 3) uint8 for ``render_mode="rgb_array"``, else None."""
@@ -159,46 +169,4 @@ class ContainerEnv(PickingEnv):
             return None
         from unload.drawing.picture import snapshot  # here, because few look and Matplotlib is slow
 
-        return snapshot(self.physics.load, self.physics.present, self.physics.positions())
-
-
-class _OneContainer(ContainerVectorEnv):
-    """A vector environment of one container, whose lifts its own ``physics`` decides."""
-
-    def __init__(self, physics: PhysicsName | Physics, settings: dict[str, Any]) -> None:
-        super().__init__(1, autoreset_mode=AutoresetMode.DISABLED, **settings)
-        self.physics = make_physics(physics)
-        self.lent = self.physics is physics
-
-    def observed_positions(self) -> np.ndarray:
-        return self.physics.positions() + self._noise
-
-    def _put_load(self, env: int, load: Load, noise: np.ndarray) -> None:
-        self.physics.reset(load)
-        self._failed = np.zeros(len(load), bool)
-        self._noise = noise if self.physics.restores else np.zeros_like(noise)
-        super()._put_load(env, load, self._noise)
-
-    def _pick(
-        self, actions: np.ndarray, playing: np.ndarray
-    ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        rewards, picked = super()._pick(actions, playing)
-        item = int(picked["item"][0])
-        if rewards[0] > 0:
-            self.physics.remove(item)
-            self._failed[:] = False
-        elif item >= 0:
-            self._failed[item] = True
-
-        # A lift may have moved other boxes. Then all are seen anew; what has failed stays so.
-        if not self.physics.restores:
-            present, visible = np.flatnonzero(self.physics.present), self._containers.visible[0]
-            self._show_items(0, present, self.observed_positions(), self.physics.load)
-            self._containers.masks[0] &= ~self._failed[visible]
-        return rewards, picked
-
-    def _lift(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        item = int(self._containers.visible[0, actions[0]])
-        # A row without a box is a failed pick that asks no physics.
-        distance = self.physics.lift(item) if item >= 0 else 0.0
-        return np.array([item]), np.array([distance])
+        return snapshot(self.load, self.present, self._envs.positions())

@@ -1,7 +1,7 @@
 """Many containers in arrays (Sec. III-A, Fig. 2): what ``PickingVectorEnv.step`` asks of them."""
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from unload.load.boxes import Load, check_no_overhang, check_stack, check_suppor
 from unload.load.substacks import stack_load
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import situation_in
-from unload.physics.table import LiftTable, TablePhysics, shared_table
-from unload.support import checks
+from unload.physics.table import PhysicsName, make_physics
 
 
 class ContainerVectorEnv(PickingVectorEnv):
@@ -24,16 +23,12 @@ class ContainerVectorEnv(PickingVectorEnv):
     See ``ContainerEnv`` for the task and for the arguments not explained here.
 
     Args:
-        physics: ``"table"``, or a ``LocalPhysics`` of your own, which is left open. Of yours only
-            ``simulate`` is called, for each pick that does not repeat a failed one; a
-            ``TablePhysics`` is asked only what its table lacks.
-            Single environments take any ``Physics``, each one of its own:
-            ``SyncVectorEnv([lambda: ContainerEnv(Mine())] * num_envs)``.
+        physics: ``"table"``, ``"places"``, ``"local"``, or a ``LocalPhysics`` of your own. Of yours
+            ``simulate`` is called, for each pick that does not repeat a failed one, and ``close``;
+            a ``TablePhysics`` is asked only what neither its table nor a rule answers.
 
     Attributes:
         physics: what lifts.
-        lent: whether it is the caller's, who closes it.
-        table: the lifts of a ``TablePhysics``, which adds unknown ones; empty for another physics.
         visible: (num_envs, 128) int32, the item in each row of the observations, -1 in rows
             without.
     """
@@ -43,33 +38,20 @@ class ContainerVectorEnv(PickingVectorEnv):
     def __init__(
         self,
         num_envs: int = task.NUM_ENVS,
-        physics: Literal["table"] | LocalPhysics = "table",
+        physics: PhysicsName | LocalPhysics = "table",
         stack: Callable[[np.random.Generator], Load] = stack_load,
         **settings,
     ) -> None:
         super().__init__(num_envs, **settings)
         check_stack(stack)
         self._how_observed = self.equalize, self.ties == "average"
-        self.stack, self.lent = stack, isinstance(physics, LocalPhysics)
-        if isinstance(physics, str):
-            checks.one_of("physics", physics, ("table",))
-            physics = TablePhysics(shared_table())
-        wanted = "'table' or a LocalPhysics"
-        self.physics: Any = checks.instance("physics", physics, LocalPhysics, wanted)
-        # The lifts that are known; none of a physics without a table.
-        self.table = physics.table if isinstance(physics, TablePhysics) else LiftTable()
-        # No compiled loop knows what another class does.
-        self._always_simulate = type(physics) is not TablePhysics
+        self.stack = stack
+        self.physics: Any = make_physics(physics)
         self._containers = containers.allocate(self.num_envs, 0, 0)
 
     def close_extras(self, **kwargs) -> None:
-        self.close_physics()
+        self.physics.close()
         super().close_extras(**kwargs)
-
-    def close_physics(self) -> None:
-        """Close the physics, unless it is the caller's."""
-        if not self.lent:
-            self.physics.close()
 
     @property
     def visible(self) -> np.ndarray:
@@ -91,29 +73,28 @@ class ContainerVectorEnv(PickingVectorEnv):
             # The paper's loads stand and have no overhangs, as they are made. Lifts that follow
             # contacts alone would pull a box through one that hangs over it.
             if load is not None or self.stack is not stack_load:
-                check_supported(chosen, "load" if load is not None else "what stack returned")
-                if isinstance(self.physics, LocalPhysics):
-                    check_no_overhang(chosen)
-            self._put_load(env, chosen, drift(len(chosen), self.position_noise, rng))
+                self._check(chosen, "load" if load is not None else "what stack returned")
+            starts, links = chosen.contacts
+            self._make_room(len(chosen), len(links))
+            state, count = self._containers, len(chosen)
 
-    def _put_load(self, env: int, load: Load, noise: np.ndarray) -> None:
-        """Fill one container."""
-        starts, links = load.contacts
-        self._make_room(len(load), len(links))
-        state, count = self._containers, len(load)
+            # Lifts follow where the boxes are put, observations where they are seen.
+            state.geometry[env, :count, :3] = chosen.positions
+            state.geometry[env, :count, 3:] = chosen.sizes
+            state.starts[env, :, : count + 1] = starts
+            state.links[env, : len(links)] = links
+            state.present[env, :count] = True
+            state.present[env, count:] = False
+            state.left[env], state.unloaded[env] = count, 0
+            state.widths[env] = chosen.container[1]
+            noise = drift(count, self.position_noise, rng)
+            self._show(env, np.arange(count), chosen.positions + noise, chosen)
 
-        # Lifts follow where the boxes are put, observations where they are seen.
-        state.geometry[env, :count, :3] = load.positions
-        state.geometry[env, :count, 3:] = load.sizes
-        state.starts[env, :, : count + 1] = starts
-        state.links[env, : len(links)] = links
-        state.present[env, :count] = True
-        state.present[env, count:] = False
-        state.left[env], state.unloaded[env] = count, 0
-        state.widths[env] = load.container[1]
-        self._show_items(env, np.arange(count), load.positions + noise, load)
+    def _check(self, load: Load, name: str) -> None:
+        check_supported(load, name)
+        check_no_overhang(load)
 
-    def _show_items(self, env: int, items: np.ndarray, positions: np.ndarray, load: Load) -> None:
+    def _show(self, env: int, items: np.ndarray, positions: np.ndarray, load: Load) -> None:
         """Show the items that are left, (k,) int64, where all are seen to be, (n, 3) in m."""
         state = self._containers
         order = observation.nearest(positions[items], len(items), load.container)
@@ -150,8 +131,8 @@ class ContainerVectorEnv(PickingVectorEnv):
         What is not known, ``physics`` simulates; a ``TablePhysics`` adds it to its table.
         """
         state = self._containers
-        known = self.table.entries
-        items, distances = containers.look_up(state, actions, self._always_simulate, *known)
+        known = self.physics.known or containers.NOTHING_KNOWN
+        items, distances = containers.look_up(state, actions, *known)
         unknown = np.flatnonzero(distances == containers.UNKNOWN)
         if unknown.size:
             arrays = (state.starts, state.links, state.present, state.geometry, state.widths, items)
@@ -184,3 +165,20 @@ class ContainerVectorEnv(PickingVectorEnv):
             "item_mask": (self._containers.visible >= 0).view(np.int8),
             "unloaded": self._containers.unloaded.copy(),
         }
+
+
+class OneContainer(ContainerVectorEnv):
+    """A vector environment of one container, which remembers its load and where it is seen."""
+
+    def _show(self, env: int, items: np.ndarray, positions: np.ndarray, load: Load) -> None:
+        self.load, self.seen = load, positions
+        super()._show(env, items, positions, load)
+
+    @property
+    def present(self) -> np.ndarray:
+        """(n,) bool, which items of the load have not been unloaded."""
+        return self._containers.present[0, : len(self.load)].copy()
+
+    def positions(self) -> np.ndarray:
+        """(n, 3) float64, where the items are, in m."""
+        return self.load.positions

@@ -12,10 +12,12 @@ import numpy as np
 from unload import task
 from unload.fast.ranking import features, rank, remove, replace
 from unload.physics.situation import digest_of, find_movers, key_length, write_key
-from unload.physics.table import FREE_LIFT, HELD_DOWN, UNKNOWN, find_distance
+from unload.physics.table import FREE_LIFT, UNKNOWN, find_distance, held_by_rule
 from unload.support.compiled import compiled
 
 _N_VISIBLE = task.N_VISIBLE
+# In place of what a physics knows, see ``LocalPhysics.known``.
+NOTHING_KNOWN = 0, False, np.zeros(0, np.uint64), np.zeros(0, np.int32)
 
 
 class Containers(NamedTuple):
@@ -103,11 +105,11 @@ def _show(containers, env, rows, equalize, average):
 
 
 @compiled
-def look_up(containers, actions, always_simulate, digests, micrometres):
+def look_up(containers, actions, held_down, ruled, digests, micrometres):
     """Each chosen item, (E,) int64, and how far it moves in m, or ``UNKNOWN``, (E,) float64.
 
-    Where the row is padded, the item is -1 and moves by 0. With ``always_simulate``, for a physics
-    that the table does not speak for, only what has failed is known.
+    Where the row is padded, the item is -1 and moves by 0. With a ``held_down`` of 0, for a physics
+    that no loop can speak for, only what has failed is known.
     """
     items, distances = np.empty(len(actions), np.int64), np.empty(len(actions))
     capacity = containers.present.shape[1]
@@ -124,16 +126,16 @@ def look_up(containers, actions, always_simulate, digests, micrometres):
             distances[env] = containers.failed[env, row]
             continue
 
-        if always_simulate:
+        if held_down == 0:
             distances[env] = UNKNOWN
             continue
 
-        # Free boxes and those under three others need no table, see TablePhysics.
+        # Free boxes and those under many others need no table, see TablePhysics.
         starts, links = containers.starts[env], containers.links[env]
         present, right = containers.present[env], containers.widths[env]
-        dynamic = find_movers(starts, links, present, items[env], members, HELD_DOWN + 1)
+        dynamic = find_movers(starts, links, present, items[env], members, held_down + 1)
         on_top = dynamic - 1
-        if on_top == 0 or on_top >= HELD_DOWN:
+        if on_top == 0 or on_top >= held_down:
             distances[env] = FREE_LIFT if on_top == 0 else 0.0
             continue
 
@@ -141,7 +143,10 @@ def look_up(containers, actions, always_simulate, digests, micrometres):
             starts, links, present, containers.geometry[env], right, members, dynamic, key
         )
         micrometre_count = find_distance(digests, micrometres, digest_of(key[:words]))
-        distances[env] = UNKNOWN if micrometre_count == UNKNOWN else micrometre_count / 1e6
+        if micrometre_count != UNKNOWN:
+            distances[env] = micrometre_count / 1e6
+        else:
+            distances[env] = 0.0 if ruled and held_by_rule(key[:words]) else UNKNOWN
     return items, distances
 
 

@@ -15,26 +15,27 @@ CHUNK = 32  # samples whose gradients are summed in single precision
 _BLOCK = 64  # features handled together: loops of constant length become vector instructions
 _LANES = 16  # features in the longest vector: few enough to keep their sums in registers
 
-# What is kept of _BLOCK features: rows of _BLOCK numbers in one flat array. Each name is where its
-# first row starts. What has four rows has one for each of x, y, z and the constant 1, or one for
-# each kind of feature: the chosen item's own, the minimum, the maximum, the mean.
+# What is kept of _BLOCK features is a table of rows of _BLOCK numbers, one feature a column:
+#
+#     rows    name              what, for each feature
+#      0- 3   _X … _CONSTANT    the extractor's weights of x, y and z, and its bias
+#      4- 5   _LOW, _LOW2       keys of the lowest value, and of the lowest but one
+#      6- 7   _HIGH, _HIGH2     keys of the highest value, and of the highest but one
+#      8-23   _MEAN … _HIGHEST  inputs x, y, z and 1: their mean, the chosen item's, those of the
+#                               lowest and of the highest item; four rows each
+#     24      _SLACK            values closer than this may be in the wrong order
+#     25-32   _SCORE, _FEATURE  the scorer's weights, and the features: of the chosen item, the
+#                               minimum, the maximum and the mean; four rows each
+#     33      _PART             what they add to the value before tanh
+#     34-41   _GRADIENT, …      of the extractor's weights and bias, and of _SCORE; four rows each
+#
+# The table lies in one flat array, and each name is where its first row starts there.
 _X, _Y, _Z, _CONSTANT = 0, _BLOCK, 2 * _BLOCK, 3 * _BLOCK
-_WX, _WY, _WZ, _BIAS = _X, _Y, _Z, _CONSTANT  # the extractor's weights
-_LOW = _BIAS + _BLOCK  # the key of the lowest value,
-_LOW2 = _LOW + _BLOCK  # and of the lowest but one
-_HIGH = _LOW2 + _BLOCK  # the same of the highest values
-_HIGH2 = _HIGH + _BLOCK
-_MEAN = _HIGH2 + _BLOCK  # 4 rows: the inputs of the mean,
-_OWN = _MEAN + 4 * _BLOCK  # 4 rows: of the chosen item,
-_LOWEST = _OWN + 4 * _BLOCK  # 4 rows: of the lowest item,
-_HIGHEST = _LOWEST + 4 * _BLOCK  # 4 rows: and of the highest
-_SLACK = _HIGHEST + 4 * _BLOCK  # values closer than this may be in the wrong order
-_SCORE = _SLACK + _BLOCK  # 4 rows: the scorer's weights, by kind
-_FEATURE = _SCORE + 4 * _BLOCK  # 4 rows: the features, by kind
-_PART = _FEATURE + 4 * _BLOCK  # what they add to the value before tanh
-_GRADIENT = _PART + _BLOCK  # 4 rows: of the extractor's weights and bias,
-_SCORE_GRADIENT = _GRADIENT + 4 * _BLOCK  # 4 rows: and of the scorer's weights
-_SIZE = _SCORE_GRADIENT + 4 * _BLOCK  # of all this
+_WX, _WY, _WZ, _BIAS = _X, _Y, _Z, _CONSTANT
+_LOW, _LOW2, _HIGH, _HIGH2 = 4 * _BLOCK, 5 * _BLOCK, 6 * _BLOCK, 7 * _BLOCK
+_MEAN, _OWN, _LOWEST, _HIGHEST = 8 * _BLOCK, 12 * _BLOCK, 16 * _BLOCK, 20 * _BLOCK
+_SLACK, _SCORE, _FEATURE, _PART = 24 * _BLOCK, 25 * _BLOCK, 29 * _BLOCK, 33 * _BLOCK
+_GRADIENT, _SCORE_GRADIENT, _SIZE = 34 * _BLOCK, 38 * _BLOCK, 42 * _BLOCK
 
 _FRACTION = 0x7FFFFF  # the bits of a float32 after its sign and exponent
 _ZERO, _ONE = np.float32(0), np.float32(1)

@@ -189,6 +189,9 @@ class Load:
             pairs.append(np.flatnonzero(across & (beyond > beyond[box])))
         return np.repeat(np.arange(len(self)), [*map(len, pairs)]), np.concatenate(pairs)
 
+    def __deepcopy__(self, memo: dict) -> "Load":
+        return self  # nothing of it changes
+
     def __len__(self) -> int:
         return len(self.positions)
 
@@ -236,7 +239,8 @@ def check_no_overhang(load: Load) -> None:
             below += others[~rests[others]].tolist()
             rests[others] = True
         shared = np.minimum(high[box], high) - np.maximum(low[box], low)
-        under = (shared[:, :2] > OVERLAP).all(axis=1) & (
+        # What shares less than a contact's tolerance with it is not pulled into it, see ``GAP``.
+        under = (shared[:, :2] > CONTACT_TOLERANCE).all(axis=1) & (
             load.positions[:, 2] < load.positions[box, 2]
         )
         if (free := np.flatnonzero(under & ~rests)).size:

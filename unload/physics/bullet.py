@@ -6,7 +6,7 @@ observations or rewards, and checks nothing: that is done where loads, forces an
 
 import os
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
@@ -90,6 +90,7 @@ SETTINGS = {
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # orientation of a box that is not turned
 ITERATIONS = 50
+HALF = 32 * TIME_STEP  # s, after which a pull may be given up
 
 
 def slim(size: np.ndarray) -> np.ndarray:
@@ -107,9 +108,16 @@ class Client:
         self.number = _pybullet().connect(_pybullet().DIRECT)
         self.disconnect = weakref.finalize(self, _pybullet().disconnect, self.number)
 
+    def __reduce_ex__(self, protocol):
+        """Refuse to be copied or pickled, because both would step the same simulator."""
+        raise TypeError("a simulator of PyBullet cannot be copied or pickled; make another one")
+
     def __getattr__(self, name: str) -> Any:
-        attribute = getattr(_pybullet(), name)
-        return partial(attribute, physicsClientId=self.number) if callable(attribute) else attribute
+        found = getattr(_pybullet(), name)
+        if callable(found):
+            found = partial(found, physicsClientId=self.number)
+        setattr(self, name, found)  # found without this function the next time
+        return found
 
 
 class World:
@@ -224,7 +232,11 @@ class World:
             steps -= many
 
     def pull(
-        self, body: int, force: float = task.PICK_FORCE, seconds: float = task.LIFT_TIME
+        self,
+        body: int,
+        force: float = task.PICK_FORCE,
+        seconds: float = task.LIFT_TIME,
+        hopeless: Callable[[float, float], bool] | None = None,
     ) -> float:
         """Pull a body upwards at its centre of mass; return how far it moved, in m (Sec. III-C).
 
@@ -232,10 +244,22 @@ class World:
             body: which one.
             force: N.
             seconds: how long, rounded to whole time steps.
+            hopeless: is asked after ``HALF``, with how far the body has moved, in m, and its speed,
+                in m/s, whether to give up, which returns 0. A pull that goes on ends with the same
+                bits as one that was not asked.
         """
         start = np.array(self.pose(body)[0])
+
+        def moved() -> float:
+            return float(np.linalg.norm(np.array(self.pose(body)[0]) - start))
+
+        if hopeless is not None:
+            self.step(HALF, body, (0.0, 0.0, force))
+            if hopeless(moved(), float(np.linalg.norm(self.client.getBaseVelocity(body)[0]))):
+                return 0.0
+            seconds -= HALF
         self.step(seconds, body, (0.0, 0.0, force))
-        return float(np.linalg.norm(np.array(self.pose(body)[0]) - start))
+        return moved()
 
     def close(self) -> None:
         """Disconnect the client; may be called again."""

@@ -1,48 +1,54 @@
-"""Lifts in a simulation of every box of the container; and a physics by its name."""
-
-from typing import Literal, get_args
+"""Lifts in a simulation of every box of the container."""
 
 import numpy as np
 
 from unload import task
-from unload.load.boxes import Load
-from unload.physics.base import Physics
+from unload.load.boxes import Load, check_load
 from unload.physics.bullet import TIME_STEP, UPRIGHT, World, slim
-from unload.physics.local import LocalPhysics
 from unload.physics.situation import RESOLUTION
-from unload.physics.table import TablePhysics, shared_table
 from unload.support import checks
-
-PhysicsName = Literal["local", "full", "table"]
 
 _DEPOT = -100.0  # m, height of the floor far below on which removed boxes stay
 
 
-class FullPhysics(Physics):
-    """Simulates every box of the container.
+class FullPhysics:
+    """A container whose every box is simulated.
 
     Args:
         after_pick: what is done with the other boxes after a pick. ``"restore"`` puts all
             back, ``"keep"`` leaves whatever the simulation made of them: they drift.
             ``"keep"`` simulates them as plain rigid bodies, ``"restore"`` as multibodies,
             see ``bullet.World``.
+
+    Attributes:
+        load: what it was filled with, None before the first ``reset`` and after ``close``.
+        present: (n,) bool, False for items that have been removed.
+
+    Raises:
+        RuntimeError: a method is called while it holds no load.
+        TypeError: the load is not a ``Load``, or the item is no integer.
+        ValueError: the item does not exist or has been removed.
     """
 
     def __init__(self, after_pick: str = "restore") -> None:
         checks.one_of("after_pick", after_pick, ("restore", "keep"))
-        super().__init__()
         self.after_pick = after_pick
-        self.restores = after_pick == "restore"
+        self.load: Load | None = None
+        self.present = np.zeros(0, bool)
+        self._world: World | None = None
 
-    def _reset(self, load: Load) -> None:
+    def reset(self, load: Load) -> None:
+        """Fill the container with ``load``."""
+        check_load(load)
+        self.close()  # until it is filled: nothing may be lifted in a half-filled container
         # Rigid bodies are twice as fast to lift, but moving them far, as putting boxes back does,
         # rebuilds a part of Bullet's search tree. Where nothing is put back, they pay.
         world = World(maximal_coordinates=self.after_pick == "keep")
         self._fill(load, world, slim(np.rint(load.sizes / RESOLUTION) * RESOLUTION))
+        self.load, self.present = load, np.ones(len(load), bool)
 
     def _fill(self, load: Load, world: World, sizes: np.ndarray) -> None:
         """Put the boxes of a load into an empty world, as bodies of ``sizes``, (n, 3) in m."""
-        self._stop()
         self._world = world
         length, width, height = self._container = load.container
         for position, size in (
@@ -72,7 +78,9 @@ class FullPhysics(Physics):
         self._world.step(checks.real("seconds", seconds, 0))
         self._keep()
 
-    def _lift(self, item: int) -> float:
+    def lift(self, item: int) -> float:
+        """Try to lift an item; return how far it moved, in m (Sec. III-C, appendix)."""
+        item = self._check(item)
         restore = True  # also when interrupted: no box may stay halfway
         try:
             distance = self._world.pull(self._bodies[item])
@@ -95,19 +103,31 @@ class FullPhysics(Physics):
         for index in np.flatnonzero(self.present):
             self._poses[index] = self._world.pose(self._bodies[index])
 
-    def _remove(self, item: int) -> None:
+    def remove(self, item: int) -> None:
+        """Take an item out of the container."""
+        item = self._check(item)
+        self.present[item] = False
         self._park(self._bodies[item])
 
     def positions(self) -> np.ndarray:
+        """(n, 3) float64, the centre of each item in m; removed items keep their last one."""
         self._check_filled()
         return np.array([position for position, _ in self._poses])
 
+    def close(self) -> None:
+        """Empty the container and free the simulator; ``reset`` starts it again."""
+        self.load = None
+        if self._world is not None:
+            self._world.close()
+            self._world = None
 
-def make_physics(physics: PhysicsName | Physics) -> Physics:
-    """The physics of a name; or the one that is given, which is its caller's to close."""
-    if isinstance(physics, Physics):
-        return physics
-    checks.one_of("physics", physics, get_args(PhysicsName))
-    if physics == "table":
-        return TablePhysics(shared_table())
-    return FullPhysics() if physics == "full" else LocalPhysics()
+    def _check_filled(self) -> None:
+        if self.load is None:
+            raise RuntimeError("the physics holds no load; call reset first")
+
+    def _check(self, item: int) -> int:
+        self._check_filled()
+        item = checks.integer("item", item, 0, len(self.present) - 1)
+        if not self.present[item]:
+            raise ValueError(f"item {item} has been removed; expected an item in the container")
+        return item

@@ -1,11 +1,12 @@
 """Lifts of a box in its situation: nothing else in the container is simulated."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from unload import task
-from unload.load.boxes import Load, check_no_overhang
+from unload.load.boxes import Load
 from unload.physics import mujoco
-from unload.physics.base import Physics
 from unload.physics.bullet import ENGINES, SETTINGS, World, engine_of, slim
 from unload.physics.situation import RESOLUTION, Situation, Surroundings
 
@@ -17,30 +18,40 @@ def settings_of_lifts(engine: str) -> dict:
     return SETTINGS if engine == ENGINES[0] else mujoco.settings()
 
 
-class LocalPhysics(Physics):
+class LocalPhysics:
     """Simulates the situation of the chosen box, on the load's exact grid.
 
     The chosen box and all that rests on it are free to move; what they stand on, their
     neighbours in the wall, the floor and the side walls are fixed; the rest is left out.
-    A failed lift has no effect on the container (Sec. III-D). ``surroundings`` holds the
-    situations of the load's items.
+    A failed lift has no effect on the container (Sec. III-D). What was lifted before makes no
+    difference, not in one bit, so that any number of containers may share one.
 
     Args:
         engine: ``"pybullet"`` or ``"mujoco"``; PyBullet where it is installed if None.
     """
 
     def __init__(self, engine: str | None = None) -> None:
-        super().__init__()
         self.engine = engine_of(engine)
+        self._world: World | None = None  # started when it is first needed, and after ``close``
+
+    def __deepcopy__(self, memo: dict) -> "LocalPhysics":
+        return self  # copies of an environment share it
+
+    @property
+    def known(self) -> tuple[int, bool, np.ndarray, np.ndarray] | None:
+        """What compiled loops may answer by, without ``simulate``; see ``TablePhysics``."""
+        return None
 
     def simulate(self, situation: Situation) -> float:
-        """Pull the chosen box of a situation; return how far it moved, in m, to the micrometre.
+        """Pull the chosen box of a situation; return how far it moved, in m, to the micrometre."""
+        return self._pull(situation)
 
-        What was lifted before makes no difference, not in one bit.
-        """
-        self._check_open()
+    def _pull(
+        self, situation: Situation, hopeless: Callable[[float, float], bool] | None = None
+    ) -> float:
+        """``simulate``, or give up half-way, see ``bullet.World.pull``."""
         if self.engine == "mujoco":
-            return round(mujoco.simulate(situation), 6)
+            return round(mujoco.simulate(situation, hopeless), 6)
         if self._world is None:
             self._world = World()
         elif self._world.bodies > _MOST_BODIES:
@@ -49,23 +60,33 @@ class LocalPhysics(Physics):
         world = self._world
         bodies: list[int] = []
         try:
-            for row, box in enumerate(situation.boxes * RESOLUTION):
+            places, sizes = np.split(situation.boxes * RESOLUTION, 2, axis=1)
+            for row, (place, size) in enumerate(zip(places.tolist(), slim(sizes).tolist())):
                 mass = task.MASS if row < situation.dynamic else 0.0
-                bodies.append(world.add_box(box[:3], slim(box[3:]), mass))
+                bodies.append(world.add_box(place, size, mass))
             if situation.floor is not None:
                 height = situation.floor * RESOLUTION
                 bodies.append(world.add_box((0, 0, height - 0.5), (9, 9, 1), 0))
             for side in situation.sides:
                 outwards = np.sign(side) * 0.5
                 bodies.append(world.add_box((0, side * RESOLUTION + outwards, 0), (9, 1, 9), 0))
-            return round(world.pull(bodies[0]), 6)
+            return round(world.pull(bodies[0], hopeless=hopeless), 6)
         finally:  # also when interrupted: what stays behind would be in the way of the next lift
             for body in reversed(bodies):
                 world.remove(body)
 
-    def _reset(self, load: Load) -> None:
-        check_no_overhang(load)
-        self.surroundings = Surroundings(load, self.present)
+    def lift(self, load: Load, present: np.ndarray, item: int) -> float:
+        """Pull an item of a load of which the ``present`` ones are left; see ``simulate``.
 
-    def _lift(self, item: int) -> float:
-        return self.simulate(self.surroundings.situation(item))
+        Args:
+            load: without overhangs, see ``boxes.check_no_overhang``.
+            present: (n,) bool, True for ``item``.
+            item: its number in the load.
+        """
+        return self.simulate(Surroundings(load, present).situation(item))
+
+    def close(self) -> None:
+        """Free the simulator, which starts again when it is next needed."""
+        if self._world is not None:
+            self._world.close()
+            self._world = None

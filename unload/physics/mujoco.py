@@ -5,10 +5,12 @@ millimetres. Where this decides a lift, near the threshold, the two may differ: 
 never kept in one file.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from unload import task
-from unload.physics.bullet import DAMPING, FRICTION, SETTINGS, TIME_STEP, slim
+from unload.physics.bullet import DAMPING, FRICTION, HALF, SETTINGS, TIME_STEP, slim
 from unload.physics.situation import RESOLUTION, Situation
 
 STEP = TIME_STEP / 2  # s; its own contacts are soft, and a shorter step makes them firm enough
@@ -23,8 +25,12 @@ def settings() -> dict:
     return {name: value for name, value in own.items() if name != "pybullet"}
 
 
-def simulate(situation: Situation) -> float:
+def simulate(situation: Situation, hopeless: Callable[[float, float], bool] | None = None) -> float:
     """Pull the chosen box of a situation; return how far it moved, in m (Sec. III-C).
+
+    Args:
+        situation: of the box.
+        hopeless: see ``bullet.World.pull``.
 
     Raises:
         FloatingPointError: MuJoCo gives a warning, for instance because a box flies off.
@@ -40,11 +46,17 @@ def simulate(situation: Situation) -> float:
     mujoco.mj_kinematics(model, data)
     start = data.xpos[1].copy()  # body 0 is the world
     data.xfrc_applied[1, 2] = task.PICK_FORCE
-    mujoco.mj_step(model, data, nstep=round(task.LIFT_TIME / STEP))
-    mujoco.mj_kinematics(model, data)
-    if any(warning.number for warning in data.warning):
-        raise FloatingPointError("MuJoCo cannot simulate a lift; see MUJOCO_LOG.TXT")
-    return float(np.linalg.norm(data.xpos[1] - start))
+    moved = 0.0
+    for seconds in (HALF, task.LIFT_TIME - HALF):
+        mujoco.mj_step(model, data, nstep=round(seconds / STEP))
+        mujoco.mj_kinematics(model, data)
+        if any(warning.number for warning in data.warning):
+            raise FloatingPointError("MuJoCo cannot simulate a lift; see MUJOCO_LOG.TXT")
+        moved = float(np.linalg.norm(data.xpos[1] - start))
+        speed = float(np.linalg.norm(data.qvel[:3]))
+        if hopeless is not None and seconds == HALF and hopeless(moved, speed):
+            return 0.0
+    return moved
 
 
 def _described(situation: Situation) -> str:

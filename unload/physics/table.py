@@ -2,26 +2,34 @@
 
 A lift depends on its situation alone, so a table of lifts says how far the box of a situation
 moved. The table is only as good as the physics that filled it: a file of another physics is
-refused. Two rules answer without it: a box with nothing on top is free, one with three or more
-others on top is held down.
+refused. Where physics leaves no doubt, rules answer instead: a box with nothing on top is free, one
+with three or more others on top is held down, and so is one under one or two others that lie on its
+middle. What is simulated is given up where it has become hopeless.
 """
 
 import json
 from functools import cache
 from pathlib import Path
 from threading import Lock
+from typing import Literal, get_args
 
 import numpy as np
 
 from unload import task
-from unload.physics.bullet import DAMPING, ENGINES, TIME_STEP, engine_of
+from unload.physics.bullet import DAMPING, ENGINES, HALF, TIME_STEP, engine_of
 from unload.physics.local import LocalPhysics, settings_of_lifts
 from unload.physics.situation import Situation, digest_of
 from unload.support import files
 from unload.support.compiled import compiled
 
+PhysicsName = Literal["local", "places", "table"]
+
 UNKNOWN = -1  # in place of a distance that is not in the table
 HELD_DOWN = 3  # so many boxes on top hold a box down
+# One or two hold it down, too, if their common centre is no farther from its own, along x and y,
+# than a share of the half edge, by their number; and none farther than ``FARTHEST`` half edges.
+MIDDLE = (0.0, 0.5, 0.75)
+FARTHEST = 2.0
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
 _ARRAYS = {"digests", "micrometres", "settings"}  # of a file
 
@@ -43,6 +51,8 @@ FREE_LIFT = free_lift()
 
 class LiftTable:
     """Distances in micrometres by the digest of a situation; empty at first.
+
+    A lift that was given up half-way has 0, see ``TablePhysics``.
 
     Two arrays, so that compiled code can look into them, too. Among a million situations two
     share a 64-bit digest with a probability of 3e-8.
@@ -66,9 +76,6 @@ class LiftTable:
 
     def __len__(self) -> int:
         return len(self.entries[0])
-
-    def __deepcopy__(self, memo: dict) -> "LiftTable":
-        return self  # it is shared; Gymnasium copies what it is given
 
     def find(self, situation: Situation) -> float | None:
         """Return the distance in m that the table holds for a situation, or None."""
@@ -120,29 +127,59 @@ class TablePhysics(LocalPhysics):
 
     A box with nothing on top moves by ``free_lift``, as PyBullet says. One with three or more
     others on it counts as held down and is not simulated: such situations hardly ever repeat, and
-    of those in ``data/lift_agreement.csv`` PyBullet lifts none by more than 4 cm.
+    of those in ``data/lift_agreement.csv`` PyBullet lifts none by more than 4 cm. What the table
+    lacks is held down where one or two others lie on its middle (see ``held_by_rule``), and
+    simulated elsewhere. A lift that is certain to fail says 0 m.
 
     Args:
         table: filled by its engine as situations are met. Share one among environments to share
             their experience; one of its own if None.
+        exact: ask for the distance of each lift that the table lacks and that fewer than
+            ``held_down`` boxes lie on: for a table that is kept.
+        held_down: so many boxes on top hold a box down. With 1 the boxes' places alone decide.
     """
 
-    def __init__(self, table: LiftTable | None = None) -> None:
+    def __init__(
+        self, table: LiftTable | None = None, exact: bool = False, held_down: int = HELD_DOWN
+    ) -> None:
         self.table = LiftTable() if table is None else table
+        self.exact, self.held_down = exact, held_down
         super().__init__(self.table.engine)
+
+    @property
+    def known(self) -> tuple[int, bool, np.ndarray, np.ndarray] | None:
+        """``held_down``, whether ``held_by_rule`` answers, and the entries of its table.
+
+        None for a subclass, whose ``simulate`` no loop knows.
+        """
+        own = type(self) is TablePhysics
+        return (self.held_down, not self.exact, *self.table.entries) if own else None
 
     def simulate(self, situation: Situation) -> float:
         """Look a lift up, or simulate and remember it; return the distance in m."""
-        self._check_open()
         if situation.on_top == 0:
             return FREE_LIFT
-        if situation.on_top >= HELD_DOWN:
+        if situation.on_top >= self.held_down:
             return 0.0
         distance = self.table.find(situation)
         if distance is None:
-            distance = super().simulate(situation)
+            if not self.exact and held_by_rule(np.frombuffer(situation.key, np.int32)):
+                return 0.0
+            distance = self._pull(situation, None if self.exact else hopeless)
             self.table.add(situation, distance)
         return distance
+
+
+def hopeless(moved: float, speed: float) -> bool:
+    """Whether a pull cannot lift a box any more, even if nothing holds it from now on.
+
+    Args:
+        moved: m, within the first ``HALF``.
+        speed: m/s, of its centre.
+    """
+    seconds = task.LIFT_TIME - HALF
+    rise = (task.PICK_FORCE / task.MASS - task.GRAVITY) * seconds**2 / 2
+    return moved + speed * seconds + rise < task.LIFT_THRESHOLD
 
 
 @cache
@@ -152,6 +189,21 @@ def shared_table() -> LiftTable:
     if table.engine != engine_of():  # PyBullet's answers serve where it is missing, too
         table.engine, table.foreign = engine_of(), table.entries[0]
     return table
+
+
+def make_physics(physics: PhysicsName | LocalPhysics) -> LocalPhysics:
+    """The physics of a name; or the one that is given."""
+    if isinstance(physics, LocalPhysics):
+        return physics
+    names = ", ".join(map(repr, get_args(PhysicsName)))
+    wanted = f"expected {names}, or a LocalPhysics, whose simulate decides a lift"
+    if not isinstance(physics, str):
+        raise TypeError(f"physics is {physics!r}; {wanted}")
+    if physics not in get_args(PhysicsName):
+        raise ValueError(f"physics is {physics!r}; {wanted}")
+    if physics == "local":
+        return LocalPhysics()
+    return TablePhysics(shared_table()) if physics == "table" else TablePhysics(held_down=1)
 
 
 def _digest(situation: Situation) -> np.uint64:
@@ -164,3 +216,28 @@ def find_distance(digests, micrometres, digest):
     place = np.searchsorted(digests, digest)
     known = place < len(digests) and digests[place] == digest
     return micrometres[place] if known else UNKNOWN
+
+
+@compiled(plain=True)
+def held_by_rule(key):
+    """Whether the boxes on top of the chosen one, one or two, lie on its middle, see ``MIDDLE``.
+
+    The pull raises 1.04 boxes besides the chosen one. So one on its middle rises by 9 mm, and off
+    it, it tips aside; two on it hold it down even if their other ends lie on neighbours.
+
+    Args:
+        key: the words of a situation's key, see ``write_key``.
+    """
+    first = 2 + key[1]
+    first += (len(key) - first) % 6  # behind the sides
+    on_top = key[0] - 1
+    for axis in range(2):
+        edge, total = key[first + 3 + axis], 0
+        for box in range(1, on_top + 1):
+            centre = key[first + 6 * box + axis]
+            if 2 * abs(centre) > FARTHEST * edge:
+                return False
+            total += centre
+        if 2 * abs(total) > MIDDLE[on_top] * on_top * edge:
+            return False
+    return True

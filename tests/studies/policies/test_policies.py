@@ -146,7 +146,7 @@ def test_pairs_are_of_boxes_that_are_visible_and_lie_on_one_another():
     env, observation, action = next(islice(containers(policies.random, seed=0), 40, None))
     below, above = pairs_in_sight(env)
     assert len(below) > 20 and 0 <= action < 128
-    surroundings = Surroundings(env.physics.load, env.physics.present)
+    surroundings = Surroundings(env.load, env.present)
     for low, high in zip(below, above):
         assert env.visible[high] in surroundings.on_top(int(env.visible[low]))
         assert observation[high, 2] > observation[low, 2]

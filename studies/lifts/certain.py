@@ -1,0 +1,181 @@
+"""Where is the answer to a lift certain? Loads that never repeat, asked of table and engines.
+
+    python -m studies certain
+
+A box with others on it is held down for certain, or simulated: ``TablePhysics`` decides which. The
+bounds of its rule (``table.MIDDLE``) were chosen on the lifts of one part; the other part was drawn
+anew. Both engines lift each box to the end, and what an empty table says by each stands beside it.
+"""
+
+from collections.abc import Iterator
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from studies.lifts.own_loads import FAMILIES
+from studies.results import COMMAND, measured, publish
+from studies.statistics import share_interval
+from studies.style import styled
+from unload import task
+from unload.env import observation
+from unload.load.boxes import Load
+from unload.physics.bullet import ENGINES
+from unload.physics.local import LocalPhysics, settings_of_lifts
+from unload.physics.situation import Situation, Surroundings
+from unload.physics.table import FARTHEST, HELD_DOWN, MIDDLE, LiftTable, TablePhysics, held_by_rule
+
+NAME = "certain_lifts"
+# First seed of a part, and how many lifts of each family; no other data uses these seeds.
+PARTS = {"bounds": (1_100_000, 100), "drawn anew": (1_200_000, 500)}
+PER_LOAD = 25  # lifts of a load, at most
+ASKED = 0.2  # share of the failing picks that are asked about
+STACKS = "made-up stacks"  # besides the families: a box of any proportions, and one or two on it
+EDGES = (0.05, 1.5)  # m, of boxes of these stacks
+MAX_OFFSET = 1.2  # half edges, their common centre
+COLUMNS = [
+    "part", "family", "on_top", "common", "farthest", "answer", *ENGINES,
+    *(f"table_{engine}" for engine in ENGINES),
+]  # fmt: skip
+ANSWERS = ("three or more on top", "on its middle", "given up half-way", "simulated to the end")
+
+
+def certain_data() -> None:
+    """Ask about all lifts of both parts: ``certain_lifts.csv``, a row each.
+
+    ``on_top`` is the number of boxes on the chosen one. ``common`` says how far their common centre
+    is from its centre, in half edges, the larger of x and y; ``farthest`` the same of the one that
+    is farthest. ``answer`` is how the table answers, by PyBullet. Then follow how far each engine
+    moves the box in m, if it lifts it to the end, and what a table by each engine says.
+    """
+    lifts = measured(ask_all)
+    settings = {engine: settings_of_lifts(engine) for engine in ENGINES}
+    settings |= {
+        "middle": MIDDLE,
+        "farthest": FARTHEST,
+        "first seed and lifts of each family": PARTS,
+    }
+    publish(NAME, {NAME: lifts.value}, f"{COMMAND} certain", settings, [lifts], float_format="%.6f")
+
+
+def ask_all() -> pd.DataFrame:
+    """The rows of ``certain_lifts.csv``."""
+    exact = {engine: LocalPhysics(engine) for engine in ENGINES}
+    tables = {f"table_{engine}": TablePhysics(LiftTable(engine)) for engine in ENGINES}
+    rows = []
+    for part, (seed, lifts) in PARTS.items():
+        for family in (*FAMILIES, STACKS):
+            asked = _stacks(seed) if family == STACKS else _blocked(family, seed)
+            for _, situation in zip(range(lifts), asked):
+                said = {name: each.simulate(situation) for name, each in (exact | tables).items()}
+                row = {"part": part, "family": family, "on_top": situation.on_top, **said}
+                row |= dict(zip(("common", "farthest"), offsets(situation)))
+                row["answer"] = _answer(situation, row["table_pybullet"])
+                rows.append(row)
+    return pd.DataFrame(rows)[COLUMNS]
+
+
+def offsets(situation: Situation) -> tuple[float, float]:
+    """How far the common centre of the boxes on top, and the farthest, is from the middle."""
+    centres = situation.boxes[1 : situation.dynamic, :2] / (situation.boxes[0, 3:5] / 2)
+    return np.abs(centres.mean(axis=0)).max(), np.abs(centres).max()
+
+
+def by_answer(frame: pd.DataFrame) -> pd.DataFrame:
+    """Are the answers right? A row per way to answer, and one for all.
+
+    Returns:
+        ``lifts``; by engine the ``largest`` distance, in m, of a box that the table says is held
+        down, if it is lifted to the end; by engine how many the table decides otherwise, which is
+        ``wrong``; and the upper end, ``at most``, of the 95 % interval of PyBullet's share of them.
+    """
+    groups = [(name, frame[frame["answer"] == name]) for name in ANSWERS] + [("all", frame)]
+    rows: dict[str, dict] = {}
+    for name, group in groups:
+        row: dict[str, float] = {"lifts": len(group)}
+        for engine in ENGINES:
+            held = group[f"table_{engine}"] < task.LIFT_THRESHOLD
+            row[f"largest, {engine}"] = group.loc[held, engine].max()
+            row[f"wrong, {engine}"] = (held != (group[engine] < task.LIFT_THRESHOLD)).sum()
+        row["at most"] = share_interval(int(row["wrong, pybullet"]), len(group))[1]
+        rows[name] = row
+    return pd.DataFrame(rows).T.astype({"lifts": int} | {f"wrong, {each}": int for each in ENGINES})
+
+
+@styled
+def over_middle(frame: pd.DataFrame) -> Figure:
+    """How far PyBullet lifts a box over how far off its middle one or two others lie on it.
+
+    Args:
+        frame: see ``certain_data``. The rule answers filled dots, in the shaded part.
+    """
+    figure, panels = plt.subplots(1, HELD_DOWN - 1, figsize=(9, 3.6), sharex=True, sharey=True)
+    for on_top, axes in enumerate(panels, 1):
+        lifts = frame[frame["on_top"] == on_top]
+        for number, (family, group) in enumerate(lifts.groupby("family", sort=False)):
+            ruled = group["answer"] == ANSWERS[1]
+            for some, face in ((group[ruled], f"C{number}"), (group[~ruled], "none")):
+                dots = {"s": 14, "edgecolor": f"C{number}", "facecolor": face, "linewidth": 0.7}
+                label = family if face == "none" else None
+                axes.scatter(some["common"], some[ENGINES[0]], label=label, **dots)
+        axes.axvspan(0, MIDDLE[on_top], color="0.93", zorder=0)
+        axes.axhline(task.LIFT_THRESHOLD, color="C5", ls="--", lw=1, label="threshold")
+        axes.set(xlim=(0, MAX_OFFSET), xlabel="common centre off the middle (half edges)")
+        axes.set_title("one box on top" if on_top == 1 else f"{on_top} boxes on top", fontsize=9)
+    panels[0].set_ylabel("distance moved (m)")
+    panels[0].legend(fontsize=8)
+    return figure
+
+
+def _answer(situation: Situation, distance: float) -> str:
+    """Which of ``ANSWERS`` the table gave to a box that others lie on."""
+    if situation.on_top >= HELD_DOWN:
+        return ANSWERS[0]
+    if held_by_rule(np.frombuffer(situation.key, np.int32)):
+        return ANSWERS[1]
+    return ANSWERS[3] if distance else ANSWERS[2]
+
+
+def _blocked(family: str, seed: int) -> Iterator[Situation]:
+    """Situations of boxes with others on them, as random picks in loads of a family meet them."""
+    while True:
+        rng = np.random.default_rng([seed, list(FAMILIES).index(family)])
+        load = FAMILIES[family](rng)
+        yield from _met(load, rng)
+        seed += 1
+
+
+def _met(load: Load, rng: np.random.Generator) -> Iterator[Situation]:
+    """Some of the failing picks while a load is unloaded at random: a box is free, or it stays."""
+    around, met = Surroundings(load, np.ones(len(load), bool)), 0
+    while met < PER_LOAD and around.present.any():
+        left = np.flatnonzero(around.present)
+        item = int(rng.choice(left[observation.nearest(load.positions[left])]))
+        if not around.on_top(item):
+            around.present[item] = False
+        elif rng.random() < ASKED:
+            met += 1
+            yield around.situation(item)
+
+
+def _stacks(seed: int) -> Iterator[Situation]:
+    """Boxes of any proportions on the floor, each with one or two boxes of any proportions on it.
+
+    Of two, one stands on the other or beside it.
+    """
+    rng = np.random.default_rng([seed, len(FAMILIES)])
+    while True:
+        sizes = np.exp(rng.uniform(*np.log(EDGES), (rng.integers(2, 4), 3)))
+        boxes = np.hstack([np.zeros_like(sizes), sizes])
+        tower = rng.random() < 0.5
+        for row in range(1, len(boxes)):
+            base = boxes[row - 1 if tower else 0]
+            reach = (base[3:5] + boxes[row, 3:5]) / 2 - 0.002  # m, of a shared stretch at least
+            boxes[row, :2] = base[:2] + rng.uniform(-1, 1, 2) * reach
+            boxes[row, 2] = base[2] + (base[5] + boxes[row, 5]) / 2
+        apart = np.abs(boxes[-1, :3] - boxes[-2, :3]) - (boxes[-1, 3:] + boxes[-2, 3:]) / 2
+        floor = round(-boxes[0, 5] / 2 * 1e6)
+        made = Situation(np.rint(boxes * 1e6).astype(np.int32), len(boxes), floor, ())
+        if (apart > -1e-9).any() and offsets(made)[0] <= MAX_OFFSET:
+            yield made

@@ -1,0 +1,83 @@
+"""Loads that never repeat, and what is certain of their lifts."""
+
+from contextlib import nullcontext
+
+import numpy as np
+import pytest
+
+from studies.lifts import certain
+from studies.lifts.own_loads import FAMILIES
+from studies.results import read_provenance, read_table
+from unload import Load, task
+from unload.load.boxes import BELOW, CONTACT_TOLERANCE, check_no_overhang, check_supported
+from unload.physics.bullet import ENGINES
+from unload.physics.table import FARTHEST, MIDDLE
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_loads_whose_joints_lie_anywhere_are_taken_or_refused_rightly(family, rng):
+    """Whole ones are taken, and of those that lack some boxes what their definition says."""
+    refused = 0
+    for _ in range(12):
+        load = FAMILIES[family](rng)
+        check_supported(load)
+        check_no_overhang(load)
+        kept = rng.random(len(load)) > 0.02
+        load = Load(load.positions[kept], load.sizes[kept])
+        hanging = overhangs(load)
+        refused += bool(hanging)
+        with pytest.raises(ValueError, match="hangs over") if hanging else nullcontext():
+            check_no_overhang(load)
+    assert refused > 0 or family.endswith("columns")
+
+
+def overhangs(load: Load) -> list[tuple[int, int]]:
+    """All pairs of a box and one under it on which it does not rest, directly or over others."""
+    low, high = load.positions - load.sizes / 2, load.positions + load.sizes / 2
+    shared = np.minimum(high[:, None], high) - np.maximum(low[:, None], low)
+    rests = np.zeros((len(load), len(load)), bool)
+    rests[load.contacts.pairs(BELOW)] = True
+    for box in low[:, 2].argsort(kind="stable"):  # what is below has been looked at
+        rests[box] |= rests[rests[box]].any(axis=0)
+    under = (shared[..., :2] > CONTACT_TOLERANCE).all(axis=-1) & (low[:, None, 2] > low[:, 2])
+    return list(zip(*np.nonzero(under & ~rests)))
+
+
+@pytest.mark.pybullet
+def test_a_few_lifts_are_asked_anew(set_in):
+    """Of each family and part, from the same seeds: the committed rows, to the micrometre."""
+    committed = read_table(certain.NAME)
+    assert list(committed) == certain.COLUMNS
+    set_in(certain, PARTS={name: (seed, 3) for name, (seed, _) in certain.PARTS.items()})
+    found = certain.ask_all()
+    first = committed.groupby(["part", "family"], sort=False).head(3).reset_index(drop=True)
+    assert found["answer"].tolist() == first["answer"].tolist()
+    numbers = [*certain.COLUMNS[2:5], *certain.COLUMNS[6:]]
+    np.testing.assert_allclose(found[numbers], first[numbers], atol=1e-6)
+
+
+def test_the_published_answers_are_right_and_of_todays_bounds():
+    frame, settings = read_table(certain.NAME), read_provenance(certain.NAME)["settings"]
+    assert (settings["middle"], settings["farthest"]) == ([*MIDDLE], FARTHEST)
+    ruled = frame["answer"] == certain.ANSWERS[1]
+    within = frame["common"] <= frame["on_top"].clip(upper=2).map(lambda on_top: MIDDLE[on_top])
+    few = frame["on_top"] < 3
+    assert (ruled == within & few & (frame["farthest"] <= FARTHEST)).mean() > 0.999  # rounding
+    for engine in ENGINES:
+        wrong = (frame[engine] >= task.LIFT_THRESHOLD) != (
+            frame[f"table_{engine}"] >= task.LIFT_THRESHOLD
+        )
+        assert not wrong.any()
+    table = certain.by_answer(frame)
+    assert table.loc["all", "lifts"] == len(frame) == table["lifts"].sum() / 2
+    assert table.loc["all", "at most"] < 0.002
+    anew = frame[(frame["part"] == "drawn anew") & (frame["family"] != certain.STACKS)]
+    assert len(anew) == 2000
+
+
+def test_wrong_answers_are_counted():
+    frame = read_table(certain.NAME).head(50).copy()
+    frame["table_pybullet"] = np.where(frame["pybullet"] < task.LIFT_THRESHOLD, 0.46, 0.0)
+    table = certain.by_answer(frame)
+    assert table.loc["all", "wrong, pybullet"] == 50 and table.loc["all", "wrong, mujoco"] == 0
+    assert table.loc["all", "at most"] == 1
