@@ -5,7 +5,7 @@ import pytest
 
 from tests.env.comparing import make_env
 from unload.env import observation
-from unload.load.picture import snapshot
+from unload.drawing.picture import snapshot
 from unload.load.substacks import build_load
 from unload.physics.full import FullPhysics
 
