@@ -288,8 +288,8 @@ def finished_run(
 def _result(folder: RunFolder, config: TrainConfig) -> TrainResult:
     folder.check_finished()
     network = make_network(config.network, config.n_features)
-    # Older versions of pandas otherwise miss the last bit of some numbers.
-    curve = pd.read_csv(folder.curve, float_precision="round_trip")
+    # As text first, because older versions of pandas miss the last bit of some numbers.
+    curve = pd.read_csv(folder.curve, dtype=str).astype(float).astype({"picks": np.int64})
     return TrainResult(load_policy(folder.policy, network), curve)
 
 
