@@ -30,7 +30,7 @@ export const SENTENCES = {
     "new ones, where their picks are counted.",
   index:
     "The paper’s pseudocode prints the index that sorting returns " +
-    "(argsort; a rank is argsort twice): row i sees which row comes i-th.",
+    "(argsort; a rank is argsort twice): row i sees which row comes i-th. The mask stays on.",
   no_mask:
     "Ranks again, but the mask is on in use only: " +
     "the paper needs it “primarily … during the application phase”.",
