@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
+import unload
 from notebooks import run
 from studies.falls.long import LONG
 from studies.grid import read_grid
@@ -27,6 +28,14 @@ def test_example_prints_what_it_says(capsys, tmp_path, monkeypatch):
     lines = capsys.readouterr().out.splitlines()
     printed = [line for line in lines if line and "pick/s" not in line]  # no progress bar
     assert printed == promised == ["136 False", "1.0", "1.0 128"]
+    assert (tmp_path / "load.html").stat().st_size > 100_000
+
+
+def test_the_list_is_accepted_as_it_stands(tmp_path):
+    (content,) = re.findall(r"```\n(id,.*?)```", README, flags=re.DOTALL)
+    (tmp_path / "boxes.csv").write_text(content, encoding="utf-8")
+    ids = unload.picking_order(unload.read_load(tmp_path / "boxes.csv"))["id"].tolist()
+    assert f"unload boxes.csv           # {', then '.join(ids)}\n" in README
 
 
 def test_links_lead_to_files():

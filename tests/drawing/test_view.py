@@ -3,10 +3,12 @@ import io
 import json
 
 import numpy as np
+import plotly.graph_objects as go
 import pytest
 from IPython.core.formatters import DisplayFormatter
 from matplotlib.colors import to_hex
 from matplotlib.image import imread
+from plotly.io import renderers
 
 from unload import Load, view
 from unload.drawing.picture import COLOURS
@@ -63,6 +65,21 @@ def test_ipython_displays_a_figure_and_a_picture_in_little_room_and_without_a_ne
     assert "http" not in json.dumps(bundle[_PLOTLY_MIMETYPE]) and bundle[_PLOTLY_MIMETYPE]["data"]
     picture = base64.b64decode(bundle["image/png"])
     assert imread(io.BytesIO(picture)).shape[:2] == (300, 800)
+
+
+def test_a_script_is_told_how_to_see_a_view(small_load, monkeypatch):
+    """plotly shows nothing where it finds no browser, and says nothing."""
+    figure = view(small_load)
+    assert "show()" in repr(figure) and len(repr(figure)) < 100
+    shown = []
+    monkeypatch.setattr(go.Figure, "show", lambda figure, *args, **kwargs: shown.append(kwargs))
+    monkeypatch.setattr(renderers, "default", "")
+    with pytest.raises(RuntimeError, match=r"no browser here; expected one of them, or write_html"):
+        figure.show()
+    figure.show(renderer="png")
+    monkeypatch.setattr(renderers, "default", "browser")
+    figure.show()
+    assert shown == [{"renderer": "png"}, {}]
 
 
 @pytest.mark.parametrize(

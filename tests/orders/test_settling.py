@@ -49,6 +49,34 @@ def test_boxes_are_pushed_apart_to_the_side_and_back_from_the_wall():
     assert settle(along, sizes) == pytest.approx(np.array([(0, 0, 0), (0.5, 0.2, 0), (0.5, 1, 0)]))
 
 
+def test_the_longest_row_through_a_box_says_how_much_it_shrinks():
+    """The last box stands beside a long row and a short one, which ends later; so does the first.
+
+    Rows along y: 0.9 + 0.8 + 0.803 is 3 mm too long; the short ones have room.
+    """
+    corners = {"first": (0, 0), "long": (0, 0.9), "short": (0.5, 1.2), "last": (0, 1.7)}
+    edges = {"first": (1, 0.9), "long": (0.5, 0.8), "short": (0.5, 0.5), "last": (1, 0.803)}
+    for mirrored in (False, True):
+        low = np.array([(x, y, 0) for x, y in corners.values()], float)
+        sizes = np.array([(x, y, 0.5) for x, y in edges.values()])
+        if mirrored:
+            low[:, 1] = 2.503 - low[:, 1] - sizes[:, 1]
+        smaller = moves(low, sizes, task.CONTAINER, 0.005)[1]
+        shorter = np.array([0.9, 0.8, 0, 0.803]) * (1 - 2.5 / 2.503)
+        assert smaller[:, 1] == pytest.approx(shorter, abs=1e-9)
+        assert not smaller[:, [0, 2]].any()
+
+
+@pytest.mark.parametrize(("gap", "settles"), [(0.0049, True), (0.0051, False), (0.0099, False)])
+def test_a_box_may_be_off_the_floor_by_the_tolerance_and_off_another_box_by_twice(gap, settles):
+    """The floor is where it is; of two boxes both may be off."""
+    size = np.full((1, 3), 0.5)
+    for bottom in (gap, -gap):
+        assert (settle([(0, 0, bottom)], size)[0, 2] == 0) == settles
+        low = [(0, 0, 0), (0, 0, 0.5 + bottom)]
+        assert settle(low, np.full((2, 3), 0.5))[1, 2] == 0.5
+
+
 @pytest.mark.parametrize(
     "second",
     [(0.489, 0, 0), (0, 0, 0.489), (0, 0, 0.511), (0, -0.006, 1), (0, 2.006, 0), (6.506, 0, 0)],

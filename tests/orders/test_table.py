@@ -159,7 +159,9 @@ def test_the_first_sheet_may_be_a_chart(book, tmp_path):
 @pytest.mark.parametrize(
     ("text", "most"),
     [
-        ("," * 100_000, "200 columns"),
+        ("," * 200_000, "200,000 cells"),
+        (("," * 1_000 + "\n") * 200, "200,000 cells"),
+        ("a," * 200 + "a", "200 columns"),
         ("\n" * 20_001, "20,000 lines"),
         (f"{NAMES}\n" * 3_002, "3,000 rows"),
         (f"{NAMES}\n{'a' * 1001}\n", "1,000 characters in a cell"),
@@ -178,6 +180,7 @@ def test_a_list_that_is_too_long_is_refused_before_a_table_is_made(read, set_in,
     [
         ({SHEET: sheet('<row><c r="GS1"><v>1</v></c></row>')}, "200 columns"),  # the 201st
         ({SHEET: sheet('<row r="1048576"><c r="XFD1048576"><v>1</v></c></row>')}, "20,000 lines"),
+        ({SHEET: sheet(f"<row>{'<c/>' * 199}</row>" * 1_006)}, "200,000 cells"),
         ({SHEET: sheet(f"<row>{CELL}</row>" * 3_002)}, "3,000 rows"),
         ({SHEET: b" " * 2_500_000}, "2,500,000 bytes of XML"),
         ({"xl/styles.xml": b" " * 250_001}, "250,000 bytes of styles"),
@@ -196,7 +199,7 @@ def test_what_is_as_long_as_it_may_be_is_read(read, book):
     assert read(f"{wide}\n" + f"{wide}\n" * 10).shape == (10, 200)
     assert read(f"{NAMES}\n" + f"{BOX}\n" * 3_000).shape == (3_000, 7)
     assert read_table(book({SHEET: sheet(*[f"<row>{CELL * 200}</row>"] * 2)})).shape == (1, 200)
-    assert len(read_table(pd.DataFrame(np.ones((3_000, 200))))) == 3_000
+    assert read_table(pd.DataFrame(np.ones((3_000, 200)))).shape == (3_000, 200)
     for shape, most in (((2, 201), "200 columns"), ((3_001, 6), "3,000 rows")):
         with pytest.raises(ListError, match=f"more than {most}"):
             read_table(pd.DataFrame(np.ones(shape)))

@@ -75,18 +75,17 @@ def picking_order(load: Load, by: str | None = None, rule: Rule | None = None) -
     else:
         raise TypeError(f"rule is {rule!r}; expected a function of a load and what is present")
 
-    table = pd.DataFrame({"pick": 1 + np.arange(len(load)), "id": items, "item": items})
-    if load.ids is not None:
-        table["id"] = load.ids[items]
+    names = items if load.ids is None else load.ids[items]
+    columns = {"pick": 1 + np.arange(len(load)), "id": names, "item": items}
     turns = np.argsort(items)  # of each box
     for name, (boxes, others) in (("covered", load.covers), ("behind", load.fronts)):
-        table[name] = np.isin(items, boxes[turns[others] > turns[boxes]])
+        columns[name] = np.isin(items, boxes[turns[others] > turns[boxes]])
     if stops is not None:
         left = stops[items]
-        table["early"] = left > np.minimum.accumulate(left[::-1])[::-1]
+        columns["early"] = left > np.minimum.accumulate(left[::-1])[::-1]
     for name, values in load.extras.items():
-        table[f"{name} in the list" if name in table else name] = values[items]
-    return table
+        columns[f"{name} in the list" if name in columns else name] = values[items]
+    return pd.DataFrame(columns)
 
 
 def _by_rule(load: Load, rule: Rule) -> np.ndarray:

@@ -3,7 +3,7 @@
 import csv
 import re
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from io import BytesIO, StringIO
 from itertools import islice
 from pathlib import Path
@@ -13,11 +13,12 @@ import pandas as pd
 
 from unload.support import checks
 
-# The most that is read of a list; its lines may be empty ones.
+# The most that is read of a list; lines and cells may be empty ones.
 LIMITS = {
     "rows": 3_000,
     "columns": 200,
     "lines": 20_000,
+    "cells": 200_000,
     "characters in a cell": 1_000,
     "bytes": 20_000_000,
     # Of an Excel file, which takes a second for a megabyte of cells, and three for one of styles.
@@ -66,7 +67,8 @@ def read_table(path: str | Path | pd.DataFrame, header: int = 1) -> pd.DataFrame
             wanted = "expected CSV in UTF-8, an .xlsx file, or a table that pandas has read"
             if isinstance(error, UnicodeError):
                 wanted = 'save it as what spreadsheets call "CSV UTF-8", or as an .xlsx file'
-            raise ListError(f"{file} is not a readable list: {error}; {wanted}") from error
+            said = " ".join(str(error).split())
+            raise ListError(f"{file} is not a readable list: {said}; {wanted}") from error
         table = _below_names(lines)
     _check("columns", table.shape[1])
     _check("rows", len(table))
@@ -84,15 +86,18 @@ def _check(what: str, count: int, instead: str = "") -> None:
 def _filled(lines: Iterable[list[str]], header: int) -> dict[int, list[str]]:
     """The lines that are not empty, by their numbers from ``header`` on, up to their last cell."""
     filled: dict[int, list[str]] = {}
+    count = 0
     for number, line in enumerate(lines, 1):
+        count += len(line)
         _check("lines", number)
-        _check("columns", len(line))
+        _check("cells", count)
         cells = [*map(str.strip, line)]
         while cells and not cells[-1]:
             cells.pop()
         if cells and number >= header:
             filled[number] = cells
             _check("rows", len(filled) - 1)
+            _check("columns", len(cells))
             _check("characters in a cell", max(map(len, cells)))
     return filled
 
@@ -131,7 +136,7 @@ def _csv(content: bytes, header: int) -> Iterable[list[str]]:
     return ([re.sub(r"^(-?\d+),(\d+)$", r"\1.\2", cell.strip()) for cell in line] for line in lines)
 
 
-def _excel(content: bytes) -> Iterator[list[str]]:
+def _excel(content: bytes) -> Iterable[list[str]]:
     """The cells of each line of the first sheet of cells."""
     with checks.needed_for("an Excel file"):
         from openpyxl import load_workbook
@@ -146,9 +151,7 @@ def _excel(content: bytes) -> Iterator[list[str]]:
             kept.writestr(part.filename, parts.read(part))
     sheet = load_workbook(copy, read_only=True, data_only=True, keep_links=False).worksheets[0]
     sheet.reset_dimensions()  # what a file says of its sheet's size may be wrong
-    for line in sheet.iter_rows(values_only=True):
-        filled = [place for place, cell in enumerate(line, 1) if cell is not None]
-        yield [_text(cell) for cell in line[: max(filled, default=0)]]
+    return ([*map(_text, line)] for line in sheet.iter_rows(values_only=True))
 
 
 def _text(cell: object) -> str:
