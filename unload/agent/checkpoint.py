@@ -12,6 +12,7 @@ import pandas as pd
 
 from unload import task
 from unload.agent.config import ENVS, TrainConfig, plain
+from unload.agent.curve import Point
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.agent.state import gather, kinds, put_back
 from unload.network.factory import make_network
@@ -138,8 +139,9 @@ class RunFolder:
             with suppress(OSError):  # it is gone already, or the folder is read-only
                 path.unlink()
         network = make_network(config.network, config.n_features)
-        # Older versions of pandas otherwise miss the last bit of some numbers.
-        curve = pd.read_csv(self._curve_file, float_precision="round_trip")
+        # By Python's own float, because older versions of pandas miss the last bit of some.
+        exact = dict.fromkeys(Point._fields[1:], lambda cell: float(cell or "nan"))
+        curve = pd.read_csv(self._curve_file, converters=exact)
         return TrainResult(load_policy(self.policy, network), curve)
 
     def _check_same(self, stored: dict, settings: dict) -> None:
