@@ -27,9 +27,15 @@ def test_greedy_equalizes_what_its_network_expects(observations, rng, ties):
 
 @pytest.mark.parametrize("ties", ["noise", "average"])
 def test_padded_rows_change_no_choice(observations, rng, ties):
-    """Of ranks and of a network that pools over all rows: a container with few boxes is padded."""
-    network = HeightNetwork(-1.0)  # whose fused twin there is not
-    network.forward = lambda seen, present=None: -seen[..., 2] * (seen[..., 0] - 0.1)
+    """Neither of ranks nor of a network that averages over the rows that hold a box."""
+    network = HeightNetwork()  # whose fused twin there is not
+
+    def forward(seen, present=None):
+        held = torch.ones(seen.shape[:2]) if present is None else present.float()
+        middle = (seen[..., 0] * held).sum(dim=1, keepdim=True) / held.sum(dim=1, keepdim=True)
+        return -seen[..., 2] * (seen[..., 0] - middle - 0.1)
+
+    network.forward = forward
     padded = np.concatenate([observations, np.full((40, 7, 3), PADDING, np.float32)], axis=1)
     masks = np.ones(padded.shape[:2])
     masks[:, 25:] = 0
