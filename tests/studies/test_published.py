@@ -49,7 +49,8 @@ PUBLISHED = {
     "20_a_policy_without_a_miss": "698c4502",
     "21_when_is_learning_worth_it": "cell-06 cell-09 cell-17 cell-23 cell-25 cell-27 "
     "greed-by-pick greed-ratios greed-switch",
-    "22_how_it_became_fast": "52be85f7 fast-lifts 592fcdbf c563d4e7",
+    "22_how_it_became_fast": "52be85f7 fast-lifts certain-figure certain-table certain-shares "
+    "592fcdbf c563d4e7",
     "report/01_paper_and_here": "",
     "report/02_evidence": "",
     "report/03_plans_and_verdicts": "",

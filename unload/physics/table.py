@@ -19,7 +19,7 @@ from unload import task
 from unload.physics.bullet import DAMPING, ENGINES, HALF, TIME_STEP, engine_of
 from unload.physics.local import LocalPhysics, settings_of_lifts
 from unload.physics.situation import Situation, digest_of
-from unload.support import files
+from unload.support import checks, files
 from unload.support.compiled import compiled
 
 PhysicsName = Literal["local", "places", "table"]
@@ -143,7 +143,8 @@ class TablePhysics(LocalPhysics):
         self, table: LiftTable | None = None, exact: bool = False, held_down: int = HELD_DOWN
     ) -> None:
         self.table = LiftTable() if table is None else table
-        self.exact, self.held_down = exact, held_down
+        self.exact = checks.boolean("exact", exact)
+        self.held_down = checks.integer("held_down", held_down, 1)
         super().__init__(self.table.engine)
 
     @property
