@@ -3,17 +3,19 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 import unload
 from notebooks import run
 from studies.falls.long import LONG
 from studies.grid import read_grid
+from studies.order.training import ORDER
 from studies.paper.training import PAPER, PAPER_CELLS
 from studies.results import read_provenance, read_table
 from studies.seamless.training import SEAMLESS
 from studies.statistics import by_cell, by_run, t_interval
-from studies.ties.criterion import FIG11, FIG12, likeness
+from studies.ties.criterion import likeness
 from studies.ties.training import TIES
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -87,20 +89,30 @@ def test_what_came_out_is_what_the_data_say():
     stuck = asked.query("place and not mask")[["failures", "deadlocked"]].sum()
     assert f"{100 * stuck['deadlocked'] / stuck['failures']:.1f} % of the failed picks" in text
 
-    assert "Ours start at 26 to 27 %" in text and runs["start"].between(0.255, 0.275).all()
-    assert f"none of the {len(runs)} rises steadily" in text and not runs["steady"].any()
-    every = [paper, *(by_run(read_grid(grid), likeness) for grid in (LONG, SEAMLESS, TIES))]
-    started = pd.concat(every).query("starts")
-    rising = started[started["steady"]]
-    other = [name for name in (*FIG12, *FIG11) if name != "noisier"]
-    alike = rising[other].all(axis=1).sum()
-    assert not runs["starts"].any()
-    said = f"Of {len(started)} trainings that start there, {len(rising)} rise steadily. "
-    assert said + f"Of these {len(rising)}, {alike} look like the paper's, except" in text
+    index = by_run(read_grid(ORDER), likeness)
+    masked = index[~index["cell"].str.contains("no_mask")]
+    low, high = 100 * masked["end"].min(), 100 * masked["end"].max()
+    assert f"all {len(masked)} trainings rise steadily" in text and masked["steady"].all()
+    ends = f"{low:.0f} %" if f"{low:.0f}" == f"{high:.0f}" else f"{low:.0f} to {high:.0f} %"
+    assert f"end at {ends}" in text
+    assert f"With ranks, none of {len(runs)} rises steadily." in text and not runs["steady"].any()
+    assert f"These curves start at {100 * masked['start'].mean():.0f} %" in text
+    assert np.ptp(masked["start"]) < 0.01
+    tuned = 100 * read_table("order/tuning").query("cell == 'b2048/lr_0.001'")["final_msr"]
+    assert f"with the index, ours end at {tuned.mean():.0f} %" in text
+    none = 100 * index.loc[index["cell"].str.contains("no_mask"), "end"].mean()
+    assert f"without it, success sinks to {none:.0f} %" in text
+    untrained = read_table("ties/choice").query("cell == 'untrained' and not place")
+    failures = untrained.groupby("seed")["failures"].sum()
+    assert "ten of 36 untrained networks" in text and (failures == 0).sum() == 10
+    stays = read_table("ties/choice").query("cell == @own and place and noise == 'frozen'")
+    assert "(Three of our eight agents" in text
+    assert (stays.query("not mask")["msr"] < 0.5).sum() == 3
 
     positions = paper[paper["cell"].str.startswith("positions")]
     assert "ten of ten trainings end without a miss" in text
     assert len(positions) == 10 and (positions["end"] > 0.9999).all()
+    every = [paper, *(by_run(read_grid(grid), likeness) for grid in (LONG, SEAMLESS, TIES))]
     shared = pd.concat(every).query("cell in ['averaged_mask', 'averaged_b2048_mask']")
     assert (
         f"none of {len(shared)} such trainings drops to 80 %" in text and not shared["fell"].any()
@@ -113,16 +125,29 @@ def test_the_numbers_are_those_of_the_data():
         ["mean", "min", "max"]
     )
     rows = re.findall(r"^\| .*batch \d+ \| (\d+) \| (.*) \|$", README, re.M)
+    index = 100 * by_cell(by_run(read_grid(ORDER), likeness))[["end", "lowest", "highest"]]
+    asked = read_table("order/choice").query("mask and noise == 'frozen'").groupby("cell")["msr"]
+    cells = pd.concat([cells, index])
+    judged = pd.concat([judged, 100 * asked.agg(["mean", "min", "max"])])
+    runs = by_run(read_grid(PAPER), likeness)["cell"].value_counts()
+    runs = pd.concat([runs, by_run(read_grid(ORDER), likeness)["cell"].value_counts()])
     names = ["paper_b2048_no_mask", "paper_no_mask", "paper_b2048_mask", "paper_mask"]
+    names += ["index_b2048_mask", "index_mask"]
     for (count, row), name in zip(rows, names, strict=False):
         columns = (tuple(table.loc[name]) for table in (cells, judged))
-        wanted = [f"{mean:.0f} % ({low:.0f}–{high:.0f})" for mean, low, high in columns]
-        assert row == " | ".join(wanted) and int(count) == len(PAPER.cells[name].seeds)
-    assert rows[4:] == [("10", "100 % | 100 %")]
+        wanted = [spread(*column) for column in columns]
+        assert row == " | ".join(wanted) and int(count) == runs[name], name
+    assert rows[6:] == [("10", "100 % | 100 %")]
     assert (judged.filter(like="positions", axis=0).round() == 100).all(axis=None)
     played = read_table("policies").query("condition == '500 picks' and mask")
     msr = 100 * played.groupby("policy")["success_rate"].mean()
     assert f"| Random picks | | | {msr['random']:.0f} % |" in README and msr["highest"] == 100
+
+
+def spread(mean: float, low: float, high: float) -> str:
+    """A mean in %, with the lowest and the highest value where they differ from it."""
+    alone = f"{low:.0f}" == f"{high:.0f}"
+    return f"{mean:.0f} %" if alone else f"{mean:.0f} % ({low:.0f}–{high:.0f})"
 
 
 def mean_and_half(rates: pd.Series) -> str:

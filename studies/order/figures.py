@@ -86,7 +86,9 @@ def _draw_choices(axes: Axes) -> None:
     index = read_table("order/choice").assign(place=True)
     choices = pd.concat([index, read_table("ties/choice")])
     frozen, names = choices[choices["noise"] == "frozen"], []
-    for _, cells in TRAINED.values():
+    for panel, (_, cells) in enumerate(TRAINED.values(), 1):
+        middle = len(names) + (len(cells) - 1) / 2
+        axes.text(middle, 104, str(panel), ha="center", va="bottom", fontsize=9)
         for batch, cell in cells.items():
             rows, column = frozen[frozen["cell"] == cell], len(names)
             for shift, (label, (way, marker, fill)) in zip((-0.27, 0, 0.27), ASKED.items()):
@@ -94,14 +96,13 @@ def _draw_choices(axes: Axes) -> None:
                 # Side by side within their place, so that equal ones can be counted.
                 places = column + shift + np.linspace(-0.09, 0.09, len(chosen))
                 look = {"ms": 3.5, "fillstyle": fill, "c": BATCH_COLOURS[batch], "clip_on": False}
-                axes.plot(places, 100 * chosen["msr"], marker, **look)
+                if len(chosen):  # the index was not asked by height alone
+                    axes.plot(places, 100 * chosen["msr"], marker, **look)
                 if not names:
                     axes.plot([], [], marker, ms=4, fillstyle=fill, c="0.3", label=label)
             names.append(str(batch))
-    axes.set_xticks(range(len(names)), names)
+    axes.set_xticks(range(len(names)), names, fontsize=8)
     axes.set(xlabel="panel and batch", xlim=(-0.5, len(names) - 0.5))
-    for panel in range(len(TRAINED)):
-        axes.text(2 * panel + 0.5, 104, f"{panel + 1}", ha="center", va="bottom", fontsize=9)
     axes.set_title("4  The same agents\n    in new containers", loc="left", pad=14)
     axes.grid(axis="x", visible=False)
-    axes.legend(loc="center left", fontsize=8, framealpha=0.9)
+    axes.legend(loc="upper left", bbox_to_anchor=(0, 0.62), fontsize=8)

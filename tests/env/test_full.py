@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.env.comparing import make_env
-from unload.env import observation
 from unload.drawing.picture import snapshot
+from unload.env import observation
 from unload.load.substacks import build_load
 from unload.physics.full import FullPhysics
 

@@ -54,9 +54,9 @@ def test_a_network_is_judged_by_stage():
     assert said["msr"] == pytest.approx(usual)
 
 
-def test_the_published_rows_are_the_planned_ones():
-    counts = read_table("mask/laboratory")["cell"].value_counts().to_dict()
-    assert counts == {name: len(each.seeds) for name, each in laboratory.CELLS.items()}
+def test_the_published_rows_are_the_first_of_the_planned_ones():
+    for name, seeds in read_table("mask/laboratory").groupby("cell")["seed"]:
+        assert seeds.tolist() == list(laboratory.CELLS[name].seeds)[: len(seeds)], name
     policies = read_policies(paths.DATA / "mask/runs.safetensors")
     assert len(policies) == read_provenance("mask/runs")["runs"]
 
