@@ -232,6 +232,8 @@ def held_by_rule(key):
     first = 2 + key[1]
     first += (len(key) - first) % 6  # behind the sides
     on_top = key[0] - 1
+    if on_top >= len(MIDDLE):
+        return False
     for axis in range(2):
         edge, total = key[first + 3 + axis], 0
         for box in range(1, on_top + 1):
