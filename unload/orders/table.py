@@ -127,7 +127,7 @@ def _csv(content: bytes, header: int) -> Iterable[list[str]]:
     text = content.decode("utf-8-sig")
     # The line of names is the first with many separators, and has no decimals.
     separator = ","
-    for line in islice(StringIO(text, newline=None), header - 1, None):
+    for line in islice(StringIO(text, newline=None), header - 1, LIMITS["lines"]):
         mark = max(",;\t", key=line.count)
         if line.count(mark) >= _COLUMNS - 1:
             separator = mark
