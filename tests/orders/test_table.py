@@ -82,6 +82,8 @@ def test_a_title_above_the_names_is_refused_with_their_line_and_skipped_with_hea
             with pytest.raises(ListError, match=found):
                 read(text, header=header)
         assert read(text, header=4).to_numpy().tolist() == [BOX.split(",")]
+    text = f"Ulm, Bonn, Kiel, Rom, Genf, Wien\n{names}\n{BOX.replace(',', ';')}\n"
+    assert read(text, header=2).to_numpy().tolist() == [BOX.split(",")]
     path = book(rows=("Packing list", "", NAMES, BOX))
     with pytest.raises(ListError, match="line 1 holds fewer than 6 names.* as line 3 may hold"):
         read_table(path)
