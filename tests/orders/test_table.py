@@ -61,7 +61,9 @@ def sheet(*rows: str) -> str:
 
 @pytest.mark.parametrize("text", ["", ",,\n,,\n", '"",""'])
 def test_files_without_a_name_are_refused(read, text):
-    with pytest.raises(ListError, match="holds empty cells only; expected a line of names, and"):
+    with pytest.raises(
+        ListError, match="empty cells only from line 1 on; expected a line of names"
+    ):
         read(text)
 
 
@@ -80,6 +82,8 @@ def test_a_title_above_the_names_is_refused_with_their_line_and_skipped_with_hea
             with pytest.raises(ListError, match=found):
                 read(text, header=header)
         assert read(text, header=4).to_numpy().tolist() == [BOX.split(",")]
+    text = f"Ulm, Bonn, Kiel, Rom, Genf, Wien\n{names}\n{BOX.replace(',', ';')}\n"
+    assert read(text, header=2).to_numpy().tolist() == [BOX.split(",")]
     path = book(rows=("Packing list", "", NAMES, BOX))
     with pytest.raises(ListError, match="line 1 holds fewer than 6 names.* as line 3 may hold"):
         read_table(path)
@@ -182,7 +186,8 @@ def test_a_list_that_is_too_long_is_refused_before_a_table_is_made(read, set_in,
         ({SHEET: sheet('<row r="1048576"><c r="XFD1048576"><v>1</v></c></row>')}, "20,000 lines"),
         ({SHEET: sheet(f"<row>{'<c/>' * 199}</row>" * 1_006)}, "200,000 cells"),
         ({SHEET: sheet(f"<row>{CELL}</row>" * 3_002)}, "3,000 rows"),
-        ({SHEET: b" " * 2_500_000}, "2,500,000 bytes of XML"),
+        ({SHEET: b" " * 1_500_000}, "1,500,000 bytes of XML"),
+        ({f"{part}.png": b"" for part in range(1_000)}, "1,000 parts"),
         ({"xl/styles.xml": b" " * 250_001}, "250,000 bytes of styles"),
     ],
 )

@@ -131,9 +131,10 @@ def _reachable_first(load: Load, stops: np.ndarray | None) -> np.ndarray:
         if present[item]:
             present[item] = False
             order.append(item)
-            for counts, of_item in zip(waits, waiting):
-                counts[of_item[item]] -= 1
-                for box in of_item[item][counts[of_item[item]] == 0]:
+            for counts, lists in zip(waits, waiting):
+                freed = lists[item]
+                counts[freed] -= 1
+                for box in freed[counts[freed] == 0]:
                     heappush(heap, key(box))
     return np.array(order)
 

@@ -149,7 +149,9 @@ def read_load(
         if changes.any():
             count, most = changes.any(axis=1).sum(), 1000 * np.linalg.norm(changes, axis=1).max()
             LOGGER.warning("%d of %d boxes %s up to %.1f mm", count, len(load), what, most)
-    if moves.any():  # each edge of two boxes may be elsewhere by its fault and what mended it
+    if (
+        moves.any() or smaller.any()
+    ):  # each edge of two boxes may be elsewhere by its fault and what mended it
         hidden = 2000 * (tolerance + np.abs(moves).max() + smaller.max() / 2)
         LOGGER.warning("An order may overlook overlaps of up to %.0f mm", hidden)
     return load

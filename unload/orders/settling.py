@@ -51,9 +51,10 @@ def _bottoms(low: np.ndarray, sizes: np.ndarray, tolerance: float) -> np.ndarray
     high = low + sizes
     bottom, top = low[:, 2].copy(), high[:, 2].copy()
     order = np.argsort(low[:, 2], kind="stable")  # from the floor upwards
-    for count, box in enumerate(order):
-        others = order[:count]
-        share = _shared(low, high, box, others)
+    ordered = low[order], high[order]
+    for place, box in enumerate(order):
+        others = order[:place]
+        share = _shared(*ordered, place)
         beneath = share[:, :2].min(axis=1) > 2 * tolerance
         under = others[beneath & (share[:, 2] <= 2 * tolerance)]
         most = 2 * tolerance if under.size else tolerance  # the floor is where it is
@@ -69,24 +70,24 @@ def _rows(axis: int, low, high, start, end, tolerance: float) -> Rows:
     Measured corners say what stands before what, settled ones what shares a height or a depth.
     """
     rows, order = [], np.argsort(low[:, axis] + high[:, axis], kind="stable")
-    for count, box in enumerate(order):
-        others = order[:count]
-        share, settled = _shared(low, high, box, others), _shared(start, end, box, others)
+    low, high, start, end = (corners[order] for corners in (low, high, start, end))
+    for place, box in enumerate(order):
+        share, settled = _shared(low, high, place), _shared(start, end, place)
         beside = (share[:, axis] <= 2 * tolerance) & (settled[:, 2] > OVERLAP)
         if axis == 0:  # along y otherwise, or nowhere
             beside &= (share[:, 0] <= share[:, 1]) & (share[:, 1] > -2 * tolerance)
         else:  # what is apart along x needs nothing along y
             beside &= settled[:, 0] > OVERLAP
-        rows.append((box, others[beside]))
+        rows.append((box, order[:place][beside]))
     return rows
 
 
-def _shared(low: np.ndarray, high: np.ndarray, box: int, others: np.ndarray) -> np.ndarray:
-    """The stretch that a box shares with each of the others on each axis, (k, 3) float64 in m.
+def _shared(low: np.ndarray, high: np.ndarray, place: int) -> np.ndarray:
+    """The stretch that a box shares with each one before it on each axis, (place, 3) float64 in m.
 
     Below 0 it is the gap between them.
     """
-    return np.minimum(high[box], high[others]) - np.maximum(low[box], low[others])
+    return np.minimum(high[place], high[:place]) - np.maximum(low[place], low[:place])
 
 
 def _fitting(edges: np.ndarray, rows: Rows, room: float, tolerance: float) -> np.ndarray:

@@ -22,7 +22,8 @@ LIMITS = {
     "characters in a cell": 1_000,
     "bytes": 20_000_000,
     # Of an Excel file, which takes a second for a megabyte of cells, and three for one of styles.
-    "bytes of XML": 2_500_000,
+    "parts": 1_000,
+    "bytes of XML": 1_500_000,
     "bytes of styles": 250_000,
 }
 _COLUMNS = 6  # that a list has at least
@@ -69,6 +70,9 @@ def read_table(path: str | Path | pd.DataFrame, header: int = 1) -> pd.DataFrame
                 wanted = 'save it as what spreadsheets call "CSV UTF-8", or as an .xlsx file'
             said = " ".join(str(error).split())
             raise ListError(f"{file} is not a readable list: {said}; {wanted}") from error
+        if not lines:
+            wanted = "expected a line of names, and boxes"
+            raise ListError(f"the list holds empty cells only from line {header} on; {wanted}")
         table = _below_names(lines)
     _check("columns", table.shape[1])
     _check("rows", len(table))
@@ -104,8 +108,6 @@ def _filled(lines: Iterable[list[str]], header: int) -> dict[int, list[str]]:
 
 def _below_names(lines: Mapping[int, list[str]]) -> pd.DataFrame:
     """The table of cells whose names stand in the first line; what has no name is left out."""
-    if not lines:
-        raise ListError("the list holds empty cells only; expected a line of names, and boxes")
     (first, names), *rows = lines.items()
     full = [number for number, cells in lines.items() if len(cells) - cells.count("") >= _COLUMNS]
     if full and full[0] > first:
@@ -125,7 +127,7 @@ def _csv(content: bytes, header: int) -> Iterable[list[str]]:
     text = content.decode("utf-8-sig")
     # The line of names is the first with many separators, and has no decimals.
     separator = ","
-    for line in islice(StringIO(text, newline=None), header - 1, None):
+    for line in islice(StringIO(text, newline=None), header - 1, LIMITS["lines"]):
         mark = max(",;\t", key=line.count)
         if line.count(mark) >= _COLUMNS - 1:
             separator = mark
@@ -143,6 +145,7 @@ def _excel(content: bytes) -> Iterable[list[str]]:
     # Pictures are left out; what remains is as long as the archive says, or damaged.
     copy, instead = BytesIO(), "; save it as CSV"
     with ZipFile(BytesIO(content)) as parts, ZipFile(copy, "w") as kept:
+        _check("parts", len(parts.infolist()), instead)
         xml = [part for part in parts.infolist() if part.filename.endswith((".xml", ".rels"))]
         styles = [part.file_size for part in xml if part.filename == "xl/styles.xml"]
         _check("bytes of styles", sum(styles), instead)
