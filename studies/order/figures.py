@@ -47,7 +47,7 @@ def draw_answer() -> Figure:
     for axes, (title, (grid, cells)) in zip(panels, TRAINED.items()):
         for batch, cell in cells.items():
             runs = _draw_runs(axes, read_grid(grid, [cell]), BATCH_COLOURS[batch])
-            label = f"batch {batch} ({runs} agents)"
+            label = f"batch {batch} ({runs} {'agent' if runs == 1 else 'agents'})"
             axes.plot([], [], c=BATCH_COLOURS[batch], lw=2.2, label=label)
         axes.set_title(title, loc="left")
         axes.set(xlim=(0, 20), xticks=range(0, 21, 5), xlabel="million picks of training")
