@@ -78,16 +78,20 @@ def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Resu
             if path.is_dir():
                 path.rmdir()
             print(f"{error}. It is computed again", file=sys.stderr)
-    answer = measured(compute)._asdict()
+    answer = measured(compute)._asdict() | {"question": path.stem}
     with files.locked(path.parent, wait=True):  # another command may ask the same
         files.write_nested(path, answer)
     return _read_answer(path)
 
 
 def _read_answer(path: Path) -> Result:
+    answer = files.read_nested(path)
     try:
-        return Result(**files.read_nested(path))
-    except TypeError as error:
+        # The digest of the question, which names the file, too: it may be a copy of another one.
+        if answer.pop("question") != path.stem:
+            raise KeyError("question")
+        return Result(**answer)
+    except (AttributeError, KeyError, TypeError) as error:
         raise ValueError(f"{path} holds no answer: {error!r}") from error
 
 

@@ -85,6 +85,18 @@ def test_what_is_in_the_way_of_an_answer_is_found_before_it_is_computed(tmp_path
     assert kept(tmp_path / "some", {}, partial(asked, 3)).value == 3
 
 
+def test_the_answer_to_another_question_is_not_taken_under_its_name(tmp_path, capsys):
+    for number in (1, 2):
+        kept(tmp_path, {"number": number}, partial(int, number))
+    one, other = tmp_path.glob("*.npz")
+    one.write_bytes(other.read_bytes())
+    assert [kept(tmp_path, {"number": number}, lambda: 3).value for number in (1, 2)] in (
+        [3, 2],
+        [1, 3],
+    )
+    assert "It is computed again" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", ["physics_fingerprint", "training_fingerprint"])
 def test_an_answer_of_another_fingerprint_is_not_taken(own_data, set_in, name):
     compute = Mock(side_effect="ab")
