@@ -220,7 +220,7 @@ def masked_dqn(envs, network, steps, seeds, gamma=0.0, mask=True, batch_size=64,
     seen = envs.reset(seed=seeds[0])
     for step in range(steps):
         learns = len(replay) >= batch_size
-        slots = rng.integers(len(replay), size=batch_size) if learns else []
+        slots = rng.integers(len(replay), size=batch_size) if learns else []  # before the picks
         epsilon = max(0, 1 - step / (steps / 2))  # 0 from half of the run on (Sec. IV-B)
         picks, seen = pick(choose, envs, network, seen, epsilon, mask, rng)
         if learns:

@@ -31,7 +31,7 @@ def by_what_is_learned(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     left, right = panels
     left.set(xlim=(0, 100), ylim=(len(names) - 0.4, -0.6))
     left.set_xlabel("MSR in new containers, with the mask (%)")
-    right.set(xlabel="slope of the score with height", xlim=(0, None))
+    right.set_xlabel("slope of the score with height")
     left.set_yticks(range(len(names)), names.values())
     for axes in panels:
         axes.grid(axis="y", visible=False)

@@ -98,8 +98,8 @@ def evaluate(
     settings |= {"stack": stack, "max_picks": sys.maxsize if max_picks is None else max_picks}
     arrays = isinstance(physics, str) and physics == "table"
 
-    # Each load has a seed of its own, so that it does not depend on how many are played at once;
-    # only the table answers many containers in arrays.
+    # Each load has a seed of its own, so that it does not depend on how many are played at once.
+    # Other physics are played one container at a time, as a single environment does.
     at_once = task.NUM_ENVS if arrays else 1
     load_seeds = np.random.SeedSequence(seed).generate_state(episodes).tolist()
     frames = []

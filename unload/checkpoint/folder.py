@@ -91,7 +91,10 @@ class RunFolder:
         files.write_json(self._config_file, self._settings | marks, checked=True)
 
     def check_finished(self) -> None:
-        """Raise ValueError unless what a finished run has left is whole, and of this run."""
+        """Raise ValueError unless what a finished run has left is whole, and of this run.
+
+        Then its checkpoint, which nothing needs any more, is removed.
+        """
         stored = files.read_json(self._config_file, checked=True)
         marks, made_by = stored.pop("marks", {}), stored.pop("package", "an earlier unload")
         self._check_settings(stored)
@@ -101,7 +104,7 @@ class RunFolder:
             said = f"{self.path} holds a run that {made_by} has trained, and this is {package()}"
             said += "; same_code=True says that both train in the same way"
             warnings.warn(said, stacklevel=4)  # of the caller of ``train``
-        # A finished run needs neither its checkpoint nor what a killed process wrote of one.
+        # Also what a killed process wrote of one.
         for path in (self._checkpoint_file, files.partial_of(self._checkpoint_file)):
             with suppress(OSError):  # it is gone already, or the folder is read-only
                 path.unlink()
