@@ -184,9 +184,8 @@ def update(network, target, optimizer, picks, gamma):
     columns = (torch.from_numpy(np.array(column)) for column in zip(*picks))
     before, chosen, reward, after, free, ended = columns  # (batch, ...) each
     with torch.no_grad():
-        following = target(after).masked_fill(~free, -torch.inf)  # (batch, 128)
-    best = following.amax(dim=1).masked_fill(ended, 0)  # (batch,); of an empty container nothing
-    goal = reward + gamma * best  # (batch,)
+        best = target(after).masked_fill(~free, -torch.inf).amax(dim=1)
+    goal = reward + gamma * best.masked_fill(ended, 0)  # (batch,); nothing follows an empty one
     values = network(before).gather(1, chosen[:, None])[:, 0]  # (batch, 128) -> (batch,)
     loss = smooth_l1_loss(values, goal)  # ()
     optimizer.zero_grad()
