@@ -102,7 +102,7 @@ def test_what_came_out_is_what_the_data_say():
     assert f"with the index, ours end at {tuned.mean():.0f} %" in text
     alone = 100 * read_table("order/laboratory").groupby("cell")["judged"].mean()
     assert f"succeed in {alone['random_index']:.0f} % of their picks with the index" in text
-    assert alone["random_rank"] > 99.9
+    assert alone["random_rank"] > 99 and "in nearly all with ranks" in text
     none = 100 * index.loc[index["cell"].str.contains("no_mask"), "end"].mean()
     assert f"without it, success sinks to {none:.0f} % (one training)" in text
     untrained = read_table("ties/choice").query("cell == 'untrained' and not place")

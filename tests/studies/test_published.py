@@ -287,7 +287,7 @@ def test_the_index_is_what_notebook_12_says():
     assert f"They end at {spread(masked['end']).replace('–', ' to ')} %" in text
     assert (masked["start"].round(2) == 0.27).all() and "The curves start at 27 %" in text
     judged = read_table("order/laboratory").groupby("cell")["judged"].mean()
-    assert judged["random_rank"] > 0.9995 and round(judged["random_index"], 2) == 0.6
+    assert judged["random_rank"] > 0.99 and round(judged["random_index"], 2) == 0.6
     assert "with the index in 60 %" in text
     end = read_table("order/laboratory").groupby("cell")["end"].mean()
     assert f"the index ends at {100 * end['index_weight_0.5']:.0f} % in the laboratory" in text
