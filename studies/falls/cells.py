@@ -22,6 +22,7 @@ CONFIG = TrainConfig(
     picks=384_000, batch_size=64, n_features=16, learning_rate=3e-3, replay_size=2**15,
     mask=True, log_interval=50,
 )  # fmt: skip
+B256 = replace(CONFIG, batch_size=256)
 SEEDS, REMEDY_SEEDS, FEW_SEEDS = range(2000, 2020), range(2000, 2050), range(2000, 2010)
 FRESH_SEEDS = range(3000, 3020)
 ENDINGS = {"": True, "_no_mask": False}  # how a cell's name ends, and whether the mask is on

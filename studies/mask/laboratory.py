@@ -16,7 +16,7 @@ from torch import nn
 
 from studies import changes
 from studies.falls import measures
-from studies.falls.cells import CONFIG, SHORT, Change
+from studies.falls.cells import B256, SHORT, Change
 from studies.falls.laboratory import SLOPES, keep_cells, train_in_laboratory
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell, cell
@@ -27,7 +27,6 @@ from unload import task
 from unload.agent.greedy import greedy_actions
 from unload.agent.training import Training
 
-B256 = replace(CONFIG, batch_size=256)
 SEEDS = range(9500, 9520)
 MASKS = {"": True, "_no_mask": False}  # how a cell's name ends
 STAGES = {"msr_25": (0, 25), "msr_100": (25, 100), "msr_500": (100, 500)}  # picks of an episode

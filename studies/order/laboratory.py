@@ -15,7 +15,7 @@ import pandas as pd
 
 from studies import changes
 from studies.falls import measures
-from studies.falls.cells import CONFIG, SHORT, Change, changed
+from studies.falls.cells import B256, CONFIG, SHORT, Change, changed
 from studies.falls.laboratory import keep_cells, train_in_laboratory
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell, cell
@@ -29,7 +29,6 @@ from unload import task
 from unload.agent.training import Training
 from unload.load.boxes import ABOVE, BELOW, BESIDE
 
-B256 = replace(CONFIG, batch_size=256)
 SEEDS, FEW_SEEDS = range(9600, 9610), range(9600, 9603)
 MASKS = {"": True, "_no_mask": False}  # how a cell's name ends
 SEEN: dict[str, Change] = {"rank": None, "index": see_index}

@@ -18,7 +18,7 @@ import pandas as pd
 import torch
 
 from studies.changes import repeated, without
-from studies.falls.cells import CONFIG
+from studies.falls.cells import B256, CONFIG
 from studies.falls.laboratory import SLOPES, TILTS, keep_cells, point, train_in_laboratory
 from studies.falls.long import LONG, published_networks
 from studies.fingerprint import training_fingerprint
@@ -173,7 +173,6 @@ def filled_at_deadlocks(run: Training) -> None:
     rollout.pick = pick_and_fill
 
 
-B256 = replace(CONFIG, batch_size=256)
 CHOICE_CELLS = {
     f"choice_{choice}_memory_{memory}{'' if mask else '_no_mask'}": cell(
         CONFIG, CHOICE_SEEDS, choice_change(choice, memory), position_noise=0.0, mask=mask
