@@ -1,11 +1,11 @@
 """The command line: each experiment is a part."""
 
 import argparse
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import partial
 
 from studies.falls import laboratory, long
-from studies.grid import train_grid
+from studies.grid import Grid, train_grid
 from studies.heap import greed, table
 from studies.lifts import agreement, certain, engines, lift_table
 from studies.mask import laboratory as mask_laboratory
@@ -28,9 +28,13 @@ JOBS = {
 }  # fmt: skip
 
 
-def some(cells: Iterable[str]) -> dict:
-    """The options of a part of which some cells can be trained alone."""
-    return {"--cells": {"nargs": "+", "choices": cells}, **JOBS}
+def some(grid: Grid) -> dict:
+    """The options of a part of which some cells or runs can be trained alone."""
+    text = (
+        f"cells to train ({', '.join(grid.cells)}), or runs, such as {next(iter(grid.configs()))}"
+    )
+    choices = [*grid.cells, *grid.configs()]
+    return {"--cells": {"nargs": "+", "choices": choices, "metavar": "CELL", "help": text}, **JOBS}
 
 
 def lifts(n_jobs: int) -> None:
@@ -59,20 +63,20 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "certain": ("lifts of loads that never repeat", certain.certain_data, {}),
     "observation": ("Figs. 4–6", visible_items.observation_data, {}),
     "tuning": ("Figs. 8–10", tuning.tuning_data, JOBS),
-    "training": ("Figs. 11 and 12", training.training_data, some(training.PAPER.cells)),
+    "training": ("Figs. 11 and 12", training.training_data, some(training.PAPER)),
     "variants": ("other networks and rewards", variants.variants_data, JOBS),
     "policies": ("policies compared", policies, JOBS),
     "sb3": ("agents of Stable-Baselines3, trained for minutes", sb3, JOBS),
     "laboratory": ("why runs fall: the laboratory", laboratory.laboratory_data, JOBS),
     "fresh": ("why runs fall: fresh seeds", laboratory.fresh_data, JOBS),
     "seamless": (
-        "seamless walls, in which boxes jam", seamless.seamless_data, some(seamless.CELLS)
+        "seamless walls, in which boxes jam", seamless.seamless_data, some(seamless.SEAMLESS)
     ),
     "ties_laboratory": (
         "how long an order of equals lasts: the laboratory", ties_laboratory.laboratory_data, JOBS
     ),
-    "ties": ("how equal coordinates are ranked", partial(train_grid, ties.TIES), some(ties.CELLS)),
-    "falls": ("why runs fall: the long runs", long.falls_data, some(long.LONG.cells)),
+    "ties": ("how equal coordinates are ranked", partial(train_grid, ties.TIES), some(ties.TIES)),
+    "falls": ("why runs fall: the long runs", long.falls_data, some(long.LONG)),
     "choice": ("published networks with other noise and other masks", choice.choice_data, JOBS),
     "choice_laboratory": (
         "noise at the choice or in the memory, the mask in training: the laboratory",
@@ -80,9 +84,9 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     ),
     "order": (
         "the index that sorting returns, in place of the rank", order.order_data,
-        some(order.ORDER.cells),
+        some(order.ORDER),
     ),
-    "mask": ("parts of an episode to learn from", mask.mask_data, some(MASK.cells)),
+    "mask": ("parts of an episode to learn from", mask.mask_data, some(MASK)),
     "order_laboratory": (
         "the index that sorting returns: the laboratory", order_laboratory.laboratory_data, JOBS
     ),

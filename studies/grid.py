@@ -94,25 +94,31 @@ class Grid(NamedTuple):
 def train_grid(grid: Grid, cells: Sequence[str] | None = None, n_jobs: int = -1) -> Path:
     """Train the runs of a grid that are not finished, and publish all that are.
 
+    Published runs stay beside them, if training has the same fingerprint and their cell the same
+    configuration; whoever changes the ``change`` of a cell gives it another name.
+
     Args:
         grid: of the runs.
-        cells: to train, all if None.
+        cells: to train, by name, or single runs, such as ``"plain/seed_3"``; all if None.
 
     Returns:
         The folder that holds the folders of the runs, by their names.
 
     Raises:
         RuntimeError: runs failed; the message says which and why. The others are published.
-        ValueError: fewer runs would be finished than are published; nothing is trained.
+        ValueError: fewer runs would be there than are published; nothing is trained.
     """
     configs = grid.configs()
     wanted = {
-        name: config for name, config in configs.items() if not cells or cell_of(name) in cells
+        name: config
+        for name, config in configs.items()
+        if not cells or name in cells or cell_of(name) in cells
     }
     fingerprint = training_fingerprint({cell.config.network for cell in grid.cells.values()})
     kept = paths.RUNS / grid.name / fingerprint / "full"
     changes = {name: grid.cells[cell_of(name)].change for name in wanted}
-    _check_count(grid.name, kept, len(_records(kept, configs).keys() | wanted.keys()))
+    there = _records(kept, configs).keys() | _published(grid, fingerprint).keys()
+    _check_count(grid.name, kept, len(there | wanted.keys()))
     report = run_sweep(wanted, kept, n_jobs, changes=changes)
     _publish(grid, configs, kept, fingerprint)
     failed = report[report["error"] != ""]
@@ -132,8 +138,8 @@ def _check_count(name: str, kept: Path, runs: int) -> None:
     there = published_runs(read_provenance(name))
     if runs < there:
         raise ValueError(
-            f"{kept} would hold {runs} finished runs; expected at least as many as the {there} "
-            f"of {name}"
+            f"{runs} runs of {name} would be finished in {kept}, or published and still the same; "
+            f"expected at least as many as the {there} that are published"
         )
 
 
@@ -142,37 +148,63 @@ def published_runs(record: Mapping[str, Any]) -> int:
     return record.get("runs kept", record.get("runs", 0))
 
 
-def _publish(grid: Grid, configs: dict, kept: Path, fingerprint: str) -> None:
-    """Publish the finished runs in ``kept``, no fewer than there are, and their provenance."""
-    records = _records(kept, configs)
-    _check_count(grid.name, kept, len(records))
-    if not records:
-        return
-    done = {name: configs[name] for name in records}
+def _published(grid: Grid, fingerprint: str) -> dict[str, tuple[Greedy | None, pd.DataFrame]]:
+    """The policies and curves of those published runs that would be trained the same today."""
+    record = read_provenance(grid.name)
+    if grid.measure is not None or record.get("fingerprint") != fingerprint:
+        return {}
+    policies = read_policies(_policies_file(grid)) if grid.policies else {}
+    configs, settings = grid.configs(), _settings(grid)
+    runs = {}
+    for (cell, seed), curve in read_grid(grid).groupby(["cell", "seed"], sort=False):
+        name = f"{cell}/seed_{seed}"
+        if name in configs and record["settings"][cell] == settings[cell]:
+            runs[name] = policies.get(name), curve.reset_index(drop=True)
+    return runs
 
-    # All that is published is read back from the folders of the runs, whenever they were trained.
-    policies, curves = {}, {}
-    for name, config in done.items():
-        change = grid.cells[cell_of(name)].change
-        policies[name], curves[name] = finished_run(kept / name, config, change)
+
+def _publish(grid: Grid, configs: dict, kept: Path, fingerprint: str) -> None:
+    """Publish the finished runs in ``kept`` beside those that are published and still the same."""
+    records, runs = _records(kept, configs), _published(grid, fingerprint)
+    parts = [files.read_json(path) for path in records.values()]
+    if old := runs.keys() - records.keys():
+        record = read_provenance(grid.name)  # of which these runs are a part
+        share = len(old) / record["runs"]
+        parts.append(record | {"runs": len(old), "wall_time_s": share * record["wall_time_s"]})
+    # What was trained here is read back from the folders of the runs, whenever that was.
+    for name in records:
+        runs[name] = finished_run(kept / name, configs[name], grid.cells[cell_of(name)].change)
+    _check_count(grid.name, kept, len(runs))
+    if not runs:
+        return
+    runs = {name: runs[name] for name in configs if name in runs}
+
     if grid.measure is None:
-        write_curves(grid, curves)
+        write_curves(grid, {name: curve for name, (_, curve) in runs.items()})
         if grid.policies:
-            write_policies(paths.DATA / f"{grid.name}.safetensors", policies)
+            write_policies(
+                _policies_file(grid), {name: policy for name, (policy, _) in runs.items()}
+            )
     else:
         rows = [
-            {"cell": cell_of(name), "seed": config.seed, **grid.measure(policies[name], config)}
-            for name, config in done.items()
+            {"cell": cell_of(name), "seed": configs[name].seed}
+            | grid.measure(policy, configs[name])
+            for name, (policy, _) in runs.items()
         ]
         write_table(grid.name, pd.DataFrame(rows))
+    record = joined(parts) | {"fingerprint": fingerprint, "planned": len(configs)}
+    write_provenance(grid.name, grid.command, _settings(grid), record)
 
-    # The first seed stands for the others of its cell: it rebuilds their configurations, too.
-    first = {
-        name: configs[f"{name}/seed_{cell.seeds[0]}"].plain() for name, cell in grid.cells.items()
+
+def _settings(grid: Grid) -> dict[str, dict]:
+    """The configuration of each cell's first seed; it stands for the others of its cell."""
+    return {
+        name: replace(cell.config, seed=cell.seeds[0]).plain() for name, cell in grid.cells.items()
     }
-    record = joined(map(files.read_json, records.values()))
-    record |= {"fingerprint": fingerprint, "planned": len(configs)}
-    write_provenance(grid.name, grid.command, first, record)
+
+
+def _policies_file(grid: Grid) -> Path:
+    return paths.DATA / f"{grid.name}.safetensors"
 
 
 def cell_of(run: str) -> str:
@@ -240,7 +272,7 @@ def ask_policies(
         settings: of the containers.
         n_jobs: processes.
     """
-    policies = read_policies(paths.DATA / f"{grid.name}.safetensors")
+    policies = read_policies(_policies_file(grid))
     # The weights are part of the question: a policy that was trained again is asked again.
     asked = [
         ({"name": run, "weights": code_of(policy.network)} | settings, (policy, settings))

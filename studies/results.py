@@ -269,7 +269,7 @@ def run_record(seconds: float) -> dict:
 
 
 def joined(records: Iterable[dict]) -> dict:
-    """Return one record of several runs.
+    """Return one record of several runs, or of records that are joined themselves.
 
     Their number, the sum of their wall times; and of the rest the one value that all share, or
     the list of those that occur.
@@ -277,10 +277,13 @@ def joined(records: Iterable[dict]) -> dict:
     # Records that were kept while there was one engine do not name it.
     records, rest = [{"engine": ENGINES[0]} | record for record in records], {}
     for name in ("revision", "versions", "engine", "python", "machine"):
-        values = list({str(record[name]): record[name] for record in records}.values())
+        several = [
+            record[name] if isinstance(record[name], list) else [record[name]] for record in records
+        ]
+        values = list({str(value): value for values in several for value in values}.values())
         rest[name] = values[0] if len(values) == 1 else values
     return {
-        "runs": len(records),
+        "runs": sum(record.get("runs", 1) for record in records),
         "wall_time_s": round(sum(record["wall_time_s"] for record in records), 1),
         **rest,
     }

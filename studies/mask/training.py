@@ -13,13 +13,12 @@ from unload.agent.greedy import Greedy
 
 
 def mask_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
-    """Train the grid, see ``train_grid``; of all cells, judge the networks, too.
+    """Train the grid, see ``train_grid``, and judge all published networks.
 
     ``mask/judged.csv`` has a row per network, see ``by_stage``.
     """
     train_grid(MASK, cells, n_jobs)
-    if cells is None:
-        ask_policies(MASK, "mask/judged", ask_by_stage, LOADS, n_jobs)
+    ask_policies(MASK, "mask/judged", ask_by_stage, LOADS, n_jobs)
 
 
 def ask_by_stage(policy: Greedy, episodes: int, seed: int) -> list[dict]:

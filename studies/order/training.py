@@ -28,13 +28,12 @@ ORDER = Grid(
 
 
 def order_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
-    """Train the grid, see ``train_grid``; of all cells, let the networks choose, too.
+    """Train the grid, see ``train_grid``, and let all published networks choose.
 
     ``order/choice.csv`` has a row per network and way to ask it, see ``ask_index``.
     """
     train_grid(ORDER, cells, n_jobs)
-    if cells is None:
-        ask_policies(ORDER, "order/choice", ask_index, LOADS, n_jobs)
+    ask_policies(ORDER, "order/choice", ask_index, LOADS, n_jobs)
 
 
 def ask_index(policy: Greedy, episodes: int, seed: int) -> list[dict]:

@@ -66,19 +66,46 @@ def test_a_grid_is_read_as_it_was_trained(trained):
     assert all(not np.array_equal(first[name], second[name]) for name in first)
 
 
+def published(folder) -> list[bytes]:
+    """The published curves and policies of the small grid."""
+    return [(folder / f"some/small.{suffix}").read_bytes() for suffix in ("csv", "safetensors")]
+
+
 def test_published_runs_are_not_replaced_by_fewer(trained, monkeypatch):
-    names = ("some/small.csv", "some/small.safetensors")
-    before = [(trained / name).read_bytes() for name in names]
-    message = "would hold 3 finished runs; expected at least as many as the 4"
+    before = published(trained)
+    message = "3 runs of some/small would be finished in .*; expected at least as many as the 4"
     with monkeypatch.context() as patch, pytest.raises(ValueError, match=message):
         patch.setattr(paths, "RUNS", trained / "other")
+        patch.setattr(grid, "training_fingerprint", lambda networks: "g")  # none is the same
         grid.train_grid(SMALL, ["plain", "shuffled"], n_jobs=1)
     assert not (trained / "other").exists()  # refused before hours of training
     grid.train_grid(SMALL, n_jobs=1)  # as many
-    assert [(trained / name).read_bytes() for name in names] == before
+    assert published(trained) == before
     provenance = read_provenance(SMALL.name)
     assert (provenance["runs"], provenance["planned"]) == (4, 4)
     assert provenance["settings"]["averaged_mask"]["mask"] is True
+
+
+def test_seeds_are_added_to_those_that_are_published(trained, set_in, tmp_path):
+    """Where the folders of the published runs are gone; bytes are those of all runs at once."""
+    curves, policies = (data for data in published(trained))
+    first = SMALL._replace(cells=CELLS | {"plain": CELLS["plain"]._replace(seeds=(0,))})
+    set_in(paths, DATA=tmp_path, RUNS=tmp_path / "first")
+    grid.train_grid(first, n_jobs=1)
+    assert read_provenance(SMALL.name)["runs"] == 3
+    set_in(paths, RUNS=tmp_path / "second")
+    grid.train_grid(SMALL, ["plain/seed_1"], n_jobs=1)
+    assert [*(tmp_path / "second/some/small/f/full").glob("*/*")] == [
+        tmp_path / "second/some/small/f/full/plain/seed_1"
+    ]
+    assert published(tmp_path) == [curves, policies]
+    provenance = read_provenance(SMALL.name)
+    assert (provenance["runs"], provenance["planned"]) == (4, 4)
+    assert provenance["versions"]["torch"] == torch.__version__
+    # Runs of another configuration do not count.
+    other = CELLS | {"plain": grid.cell(CONFIG, (0, 1), learning_rate=0.1)}
+    with pytest.raises(ValueError, match="3 runs of some/small would be finished"):
+        grid.train_grid(SMALL._replace(cells=other), ["plain/seed_1"], n_jobs=1)
 
 
 def test_runs_that_were_taken_out_need_not_be_published_again(trained, set_in):
