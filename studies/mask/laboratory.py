@@ -46,6 +46,9 @@ CELLS: dict[str, Cell] = {
         for ending, mask in MASKS.items()
         for name, (change, fields) in LEARNED.items()
     },
+    # Early picks are few, so that the memory drops none of them, not even the first random ones.
+    "all_long_memory": cell(B256, SEEDS[:10], mask=True, replay_size=B256.picks),
+    "early_short_memory": cell(B256, SEEDS[:10], EARLY, mask=True, replay_size=3000),
     "dug_25": cell(B256, SEEDS, DUG, **SHORT),
     "dug_500_no_mask": cell(B256, SEEDS, DUG, mask=False),
 }

@@ -23,6 +23,9 @@ ORDER = Grid(
         "index_b2048_mask": cell(B2048, FEW_SEEDS, see_index, mask=True),
         "index_no_mask": cell(CONFIG, range(70, 72), see_index),
         "index_b2048_no_mask": cell(B2048, range(70, 71), see_index),
+        # Random picks alone, as many: is it their number or the agent's own picks that add to what
+        # the laboratory learns from random ones?
+        "random_index": cell(CONFIG, range(70, 71), see_index, epsilon_init=1, epsilon_final=1),
     },
 )
 
