@@ -1,9 +1,9 @@
-"""Fingerprints of how the code trains and lifts, for results that rest on it.
+"""Fingerprints of how the code trains, lifts and evaluates, for results that rest on it.
 
-One is a digest of what short runs or some lifts yield. As long as it stays the same, the code still
-trains or lifts as it did when a result was made; a result of another fingerprint would come out
-otherwise today. Both are a part of what kept answers are known by, see ``results.keep_all``, and
-that of training is published.
+One is a digest of what short runs, some lifts or short episodes yield. As long as it stays the
+same, the code still trains, lifts or evaluates as it did when a result was made; a result of
+another fingerprint would come out otherwise today. All are a part of what kept answers are known
+by, see ``results.keep_all``, and that of training is published.
 """
 
 from collections.abc import Callable, Iterable
@@ -16,7 +16,9 @@ import numpy as np
 from studies.changes import height_reward
 from studies.networks import NETWORKS
 from unload import task
+from unload.agent import policies
 from unload.agent.config import TrainConfig
+from unload.agent.evaluation import evaluate
 from unload.agent.training import Training, train
 from unload.load.substacks import stack_load
 from unload.physics.full import FullPhysics
@@ -97,3 +99,10 @@ def physics_fingerprint() -> str:
             digest.update(f"{physics.lift(*here, int(item)):.3g} ".encode())
         physics.close()
     return digest.hexdigest()
+
+
+@cache
+def evaluation_fingerprint() -> str:
+    """Digest of what ``evaluate`` says of short episodes, 16 hexadecimal digits."""
+    rows = evaluate(policies.random, 3, max_picks=100).to_csv(index=False, float_format="%.3g")
+    return blake2b(rows.encode(), digest_size=8).hexdigest()

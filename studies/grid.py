@@ -29,7 +29,7 @@ from studies.results import (
     write_provenance,
     write_table,
 )
-from studies.sweep import run_sweep
+from studies.sweep import check_code, code_of_run, run_sweep
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, policy_of, settings_of
 from unload.agent.training import Training, finished_run
@@ -95,7 +95,8 @@ def train_grid(grid: Grid, cells: Sequence[str] | None = None, n_jobs: int = -1)
     """Train the runs of a grid that are not finished, and publish all that are.
 
     Published runs stay beside them, if training has the same fingerprint and their cell the same
-    configuration; whoever changes the ``change`` of a cell gives it another name.
+    configuration; whoever changes the ``change`` of a cell gives it another name. None is lost:
+    whoever does not want them any more removes the published table first.
 
     Args:
         grid: of the runs.
@@ -106,41 +107,39 @@ def train_grid(grid: Grid, cells: Sequence[str] | None = None, n_jobs: int = -1)
 
     Raises:
         RuntimeError: runs failed; the message says which and why. The others are published.
-        ValueError: fewer runs would be there than are published; nothing is trained.
+        ValueError: there is no such cell or run; published runs would be lost; runs that are
+            finished were trained with other code; runs that are published together have other
+            picks; or published data are not those of their provenance. Nothing is trained.
     """
     configs = grid.configs()
+    for name in cells or ():
+        checks.one_of("cells", name, [*grid.cells, *configs])
     wanted = {
         name: config
         for name, config in configs.items()
-        if not cells or name in cells or cell_of(name) in cells
+        if cells is None or name in cells or cell_of(name) in cells
     }
     fingerprint = training_fingerprint({cell.config.network for cell in grid.cells.values()})
     kept = paths.RUNS / grid.name / fingerprint / "full"
-    changes = {name: grid.cells[cell_of(name)].change for name in wanted}
-    there = _records(kept, configs).keys() | _published(grid, fingerprint).keys()
-    _check_count(grid.name, kept, len(there | wanted.keys()))
-    report = run_sweep(wanted, kept, n_jobs, changes=changes)
-    _publish(grid, configs, kept, fingerprint)
-    failed = report[report["error"] != ""]
-    if len(failed):
-        raise RuntimeError("runs failed:\n" + failed["error"].to_string(header=False))
-    return kept
-
-
-def _records(kept: Path, names: Iterable[str]) -> dict[str, Path]:
-    """The records of those runs that are finished, by name."""
-    records = {name: kept / name / "record.json" for name in names}
-    return {name: path for name, path in records.items() if path.exists()}
-
-
-def _check_count(name: str, kept: Path, runs: int) -> None:
-    """Refuse to publish fewer runs than are published: they take hours, and none may be lost."""
-    there = published_runs(read_provenance(name))
-    if runs < there:
+    changes = {name: grid.cells[cell_of(name)].change for name in configs}
+    finished = {name for name in configs if (kept / name / "record.json").exists()}
+    for name in finished:
+        check_code(kept / name, code_of_run(changes[name], configs[name].network))
+    there = finished | _published(grid, fingerprint).keys() | wanted.keys()
+    if lost := [name for name in _published_names(grid) if name not in there]:
         raise ValueError(
-            f"{runs} runs of {name} would be finished in {kept}, or published and still the same; "
-            f"expected at least as many as the {there} that are published"
+            f"{grid.name} would lose {len(lost)} published runs, {lost[0]} first, which today's "
+            "code or configuration would not train alike; expected that they are trained, too"
         )
+    points = {(each.num_envs, each.log_interval, each.picks) for each in configs.values()}
+    if grid.measure is None and len(points) > 1:
+        raise ValueError(f"the runs of {grid.name} have points of their curves at other picks")
+
+    report = run_sweep(wanted, kept, n_jobs, changes={name: changes[name] for name in wanted})
+    _publish(grid, kept, fingerprint)
+    if failed := [f"{name}: {error}" for name, error in report["error"].items() if error]:
+        raise RuntimeError("\n".join(["runs failed:", *failed]))
+    return kept
 
 
 def published_runs(record: Mapping[str, Any]) -> int:
@@ -148,43 +147,63 @@ def published_runs(record: Mapping[str, Any]) -> int:
     return record.get("runs kept", record.get("runs", 0))
 
 
+def _published_names(grid: Grid) -> list[str]:
+    """The names of all published runs, whatever trained them."""
+    path = paths.DATA / f"{grid.name}.csv"
+    if not path.exists():
+        return []
+    table = read_table(grid.name)
+    if grid.measure is not None:
+        return (table["cell"] + "/seed_" + table["seed"].astype(str)).tolist()
+    return list(dict.fromkeys(column.partition(" ")[2] for column in table.columns[1:]))
+
+
 def _published(grid: Grid, fingerprint: str) -> dict[str, tuple[Greedy | None, pd.DataFrame]]:
     """The policies and curves of those published runs that would be trained the same today."""
-    record = read_provenance(grid.name)
-    if grid.measure is not None or record.get("fingerprint") != fingerprint:
+    record, path = read_provenance(grid.name), paths.DATA / f"{grid.name}.csv"
+    if grid.measure is not None or record.get("fingerprint") != fingerprint or not path.exists():
         return {}
+    if record.get("digest") not in (None, files.digest(path)):
+        raise ValueError(f"{path} is not the table of its provenance; expected both from one run")
     policies = read_policies(_policies_file(grid)) if grid.policies else {}
-    configs, settings = grid.configs(), _settings(grid)
-    runs = {}
+    same = {
+        name
+        for name, settings in _settings(grid).items()
+        if settings | {"seed": 0} == record["settings"].get(name, {}) | {"seed": 0}
+    }
+    configs, runs = grid.configs(), {}
     for (cell, seed), curve in read_grid(grid).groupby(["cell", "seed"], sort=False):
         name = f"{cell}/seed_{seed}"
-        if name in configs and record["settings"][cell] == settings[cell]:
-            runs[name] = policies.get(name), curve.reset_index(drop=True)
+        if name in configs and cell in same:
+            policy = policies[name] if grid.policies else None
+            runs[name] = policy, curve.reset_index(drop=True)
     return runs
 
 
-def _publish(grid: Grid, configs: dict, kept: Path, fingerprint: str) -> None:
+def _publish(grid: Grid, kept: Path, fingerprint: str) -> None:
     """Publish the finished runs in ``kept`` beside those that are published and still the same."""
-    records, runs = _records(kept, configs), _published(grid, fingerprint)
-    parts = [files.read_json(path) for path in records.values()]
-    if old := runs.keys() - records.keys():
-        record = read_provenance(grid.name)  # of which these runs are a part
-        share = len(old) / record["runs"]
-        parts.append(record | {"runs": len(old), "wall_time_s": share * record["wall_time_s"]})
+    configs, runs, records = grid.configs(), _published(grid, fingerprint), []
+    old = len(runs)
     # What was trained here is read back from the folders of the runs, whenever that was.
-    for name in records:
-        runs[name] = finished_run(kept / name, configs[name], grid.cells[cell_of(name)].change)
-    _check_count(grid.name, kept, len(runs))
+    for name, config in configs.items():
+        path = kept / name / "record.json"
+        if path.exists():
+            records.append(files.read_json(path))
+            old -= name in runs
+            runs[name] = finished_run(kept / name, config, grid.cells[cell_of(name)].change)
     if not runs:
         return
+    if old:
+        record = read_provenance(grid.name)  # of which these runs are a part
+        share = old / record["runs"]
+        records.append(record | {"runs": old, "wall_time_s": share * record["wall_time_s"]})
     runs = {name: runs[name] for name in configs if name in runs}
 
     if grid.measure is None:
         write_curves(grid, {name: curve for name, (_, curve) in runs.items()})
         if grid.policies:
-            write_policies(
-                _policies_file(grid), {name: policy for name, (policy, _) in runs.items()}
-            )
+            policies = {name: policy for name, (policy, _) in runs.items()}
+            write_policies(_policies_file(grid), policies)
     else:
         rows = [
             {"cell": cell_of(name), "seed": configs[name].seed}
@@ -192,7 +211,8 @@ def _publish(grid: Grid, configs: dict, kept: Path, fingerprint: str) -> None:
             for name, (policy, _) in runs.items()
         ]
         write_table(grid.name, pd.DataFrame(rows))
-    record = joined(parts) | {"fingerprint": fingerprint, "planned": len(configs)}
+    record = joined(records) | {"fingerprint": fingerprint, "planned": len(configs)}
+    record["digest"] = files.digest(paths.DATA / f"{grid.name}.csv")
     write_provenance(grid.name, grid.command, _settings(grid), record)
 
 
@@ -239,7 +259,7 @@ def read_grid(grid: Grid, cells: Iterable[str] | None = None) -> pd.DataFrame:
     for cell in wanted:
         checks.one_of("cells", cell, grid.cells)
     table, curves = read_table(grid.name), []
-    for run in dict.fromkeys(column.partition(" ")[2] for column in table.columns[1:]):
+    for run in _published_names(grid):
         cell, _, seed = run.rpartition("/seed_")
         if cell in wanted:
             curve = {"cell": cell, "seed": int(seed), "picks": table["picks"]}

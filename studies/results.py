@@ -28,7 +28,11 @@ from joblib import Parallel, delayed
 from tqdm import tqdm
 
 from studies import paths
-from studies.fingerprint import physics_fingerprint, training_fingerprint
+from studies.fingerprint import (
+    evaluation_fingerprint,
+    physics_fingerprint,
+    training_fingerprint,
+)
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import files
 
@@ -167,13 +171,14 @@ def keep_all(
     Args:
         place: the folder in ``runs/``.
         compute: gives an answer; its code is a part of each question, see ``code_of``, and so are
-            the fingerprints of training and of the physics.
+            the fingerprints of training, of the physics and of ``evaluate``.
         asked: the rest of each question, and the arguments of ``compute``.
         n_jobs: processes.
     """
     folder = paths.RUNS / place
     code = {"code": code_of(compute), "fingerprint": training_fingerprint()}
     code["fingerprint of physics"] = physics_fingerprint()
+    code["fingerprint of evaluation"] = evaluation_fingerprint()
     answers = Parallel(n_jobs, return_as="generator")(
         delayed(kept)(folder, question | code, partial(compute, *arguments))
         for question, arguments in asked

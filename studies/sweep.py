@@ -69,7 +69,7 @@ def run_sweep(
     folder = Path(folder).absolute()
     runs = Parallel(n_jobs, return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
     changes = dict.fromkeys(configs) | dict(changes or {})
-    codes = {name: _code(changes[name], config.network) for name, config in configs.items()}
+    codes = {name: code_of_run(changes[name], config.network) for name, config in configs.items()}
     jobs = ((name, configs[name], folder / name, changes[name], codes[name]) for name in configs)
     errors = {}
     with tqdm(total=len(configs), unit="run", ncols=100, file=sys.stdout) as bar:
@@ -98,8 +98,7 @@ def _run(name: str, config: TrainConfig, folder: Path, change, code: str | None,
         finished = RunFolder(folder, settings_of_run(config, change=change)).finished
         log_path = os.devnull if finished else folder / "log.txt"
         folder.mkdir(parents=True, exist_ok=True)
-        if code is not None:
-            _check_code(folder / "code.json", code)
+        check_code(folder, code)
         with open(log_path, "a", encoding="utf-8") as log, one_thread():
             train(config, folder, log, callback=stop_if_alone, change=change, same_code=True)
         if not (folder / "record.json").exists():
@@ -121,19 +120,20 @@ def _orphaned(parent: int) -> bool:
     return os.getppid() != parent
 
 
-def _code(*functions: object) -> str | None:
+def code_of_run(*functions: object) -> str | None:
     """The digest of a run's own functions, None if it has none."""
     own = [function for function in functions if callable(function)]
     return code_of(own) if own else None
 
 
-def _check_code(path: Path, code: str) -> None:
-    """Keep a digest of a run's own functions; raise ValueError where the kept one is another."""
-    if not path.exists():
+def check_code(folder: Path, code: str | None) -> None:
+    """Keep the digest of a run's own functions; raise ValueError where the kept one is another."""
+    path = folder / "code.json"
+    if code is not None and not path.exists():
         files.write_json(path, {"code": code})
-    elif files.read_json(path)["code"] != code:
+    elif code is not None and files.read_json(path)["code"] != code:
         raise ValueError(
-            f"{path.parent} holds a run that was begun with other code; expected the same code, "
+            f"{folder} holds a run that was begun with other code; expected the same code, "
             "or a folder without a run"
         )
 

@@ -6,9 +6,15 @@ import pytest
 import torch
 
 from studies import fingerprint, paths
-from studies.fingerprint import physics_fingerprint, short_runs, training_fingerprint
+from studies.fingerprint import (
+    evaluation_fingerprint,
+    physics_fingerprint,
+    short_runs,
+    training_fingerprint,
+)
 from studies.policies.variants import GRIDS
 from unload import PEQNetwork
+from unload.agent import evaluation
 from unload.physics import table
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
@@ -86,3 +92,10 @@ def test_only_what_changes_training_changes_the_fingerprint(monkeypatch):
     today = training_fingerprint()
     assert today == scaled_by(1) == scaled_by(1 + 1e-7)
     assert today != scaled_by(1.01)
+
+
+def test_only_what_changes_evaluation_changes_its_fingerprint(monkeypatch):
+    today = evaluation_fingerprint()
+    assert evaluation_fingerprint.__wrapped__() == today
+    monkeypatch.setattr(evaluation, "success_rate", lambda rewards: (rewards > 0).mean() / 2)
+    assert evaluation_fingerprint.__wrapped__() != today

@@ -9,6 +9,7 @@ from functools import partial
 from unittest.mock import Mock
 
 import numpy as np
+import pandas as pd
 import pytest
 import torch
 from joblib import parallel_config
@@ -71,52 +72,72 @@ def published(folder) -> list[bytes]:
     return [(folder / f"some/small.{suffix}").read_bytes() for suffix in ("csv", "safetensors")]
 
 
-def test_published_runs_are_not_replaced_by_fewer(trained, monkeypatch):
+def test_no_published_run_is_lost(trained, monkeypatch, tmp_path):
     before = published(trained)
-    message = "3 runs of some/small would be finished in .*; expected at least as many as the 4"
-    with monkeypatch.context() as patch, pytest.raises(ValueError, match=message):
+    message = "some/small would lose 1 published runs, averaged_mask/seed_3 first"
+    with monkeypatch.context() as patch:
         patch.setattr(paths, "RUNS", trained / "other")
         patch.setattr(grid, "training_fingerprint", lambda networks: "g")  # none is the same
-        grid.train_grid(SMALL, ["plain", "shuffled"], n_jobs=1)
-    assert not (trained / "other").exists()  # refused before hours of training
-    grid.train_grid(SMALL, n_jobs=1)  # as many
+        with pytest.raises(ValueError, match=message):
+            grid.train_grid(SMALL, ["plain", "shuffled"], n_jobs=1)
+        assert not (trained / "other").exists()  # refused before hours of training
+    other = SMALL._replace(cells=CELLS | {"plain": grid.cell(CONFIG, (5, 1, 6))})
+    with pytest.raises(ValueError, match="lose 1 published runs, plain/seed_0"):  # as many
+        grid.train_grid(other, n_jobs=1)
+    grid.train_grid(SMALL, n_jobs=1)
     assert published(trained) == before
     provenance = read_provenance(SMALL.name)
     assert (provenance["runs"], provenance["planned"]) == (4, 4)
     assert provenance["settings"]["averaged_mask"]["mask"] is True
 
 
+def test_bad_grids_are_refused(trained, monkeypatch):
+    for cells in (["plain/seed_00"], "plain/seed_0"):
+        with pytest.raises(ValueError, match="cells is 'p.*; expected one of"):
+            grid.train_grid(SMALL, cells, n_jobs=1)
+    longer = SMALL._replace(cells=CELLS | {"longer": grid.cell(CONFIG, (0,), picks=1280)})
+    with pytest.raises(ValueError, match="some/small have points of their curves at other picks"):
+        grid.train_grid(longer, n_jobs=1)
+    code = trained / "runs/some/small/f/full/shuffled/seed_0/code.json"
+    kept = code.read_bytes()
+    files.write_json(code, {"code": "another"})
+    with pytest.raises(ValueError, match="seed_0 holds a run that was begun with other code"):
+        grid.train_grid(SMALL, ["plain"], n_jobs=1)
+    code.write_bytes(kept)
+    table = trained / "some/small.csv"
+    kept = table.read_bytes()
+    table.write_bytes(kept[:-20])
+    with pytest.raises(ValueError, match="small.csv is not the table of its provenance"):
+        grid.train_grid(SMALL, n_jobs=1)
+    table.write_bytes(kept)
+
+
+def test_a_failure_is_said_in_full(trained, monkeypatch):
+    rows = {"error": {"plain/seed_0": "ValueError: " + 99 * "why "}}
+    monkeypatch.setattr(grid, "run_sweep", lambda *_, **__: pd.DataFrame(rows))
+    with pytest.raises(RuntimeError, match=99 * "why "):
+        grid.train_grid(SMALL, n_jobs=1)
+
+
 def test_seeds_are_added_to_those_that_are_published(trained, set_in, tmp_path):
     """Where the folders of the published runs are gone; bytes are those of all runs at once."""
-    curves, policies = (data for data in published(trained))
-    first = SMALL._replace(cells=CELLS | {"plain": CELLS["plain"]._replace(seeds=(0,))})
+    before = published(trained)
+    first = SMALL._replace(cells=CELLS | {"plain": CELLS["plain"]._replace(seeds=(1,))})
     set_in(paths, DATA=tmp_path, RUNS=tmp_path / "first")
     grid.train_grid(first, n_jobs=1)
     assert read_provenance(SMALL.name)["runs"] == 3
     set_in(paths, RUNS=tmp_path / "second")
-    grid.train_grid(SMALL, ["plain/seed_1"], n_jobs=1)
-    assert [*(tmp_path / "second/some/small/f/full").glob("*/*")] == [
-        tmp_path / "second/some/small/f/full/plain/seed_1"
-    ]
-    assert published(tmp_path) == [curves, policies]
+    grid.train_grid(SMALL, ["plain/seed_0"], n_jobs=1)
+    folder = tmp_path / "second/some/small/f/full"
+    assert [*folder.glob("*/*")] == [folder / "plain/seed_0"]
+    assert published(tmp_path) == before
     provenance = read_provenance(SMALL.name)
     assert (provenance["runs"], provenance["planned"]) == (4, 4)
     assert provenance["versions"]["torch"] == torch.__version__
     # Runs of another configuration do not count.
     other = CELLS | {"plain": grid.cell(CONFIG, (0, 1), learning_rate=0.1)}
-    with pytest.raises(ValueError, match="3 runs of some/small would be finished"):
-        grid.train_grid(SMALL._replace(cells=other), ["plain/seed_1"], n_jobs=1)
-
-
-def test_runs_that_were_taken_out_need_not_be_published_again(trained, set_in):
-    """But no fewer than the others."""
-    for kept, runs in ((3, 4), (4, 4)):
-        set_in(grid, read_provenance=lambda name, kept=kept: {"runs": 9, "runs kept": kept})
-        grid.train_grid(SMALL, n_jobs=1)
-        assert read_provenance(SMALL.name)["runs"] == runs
-    set_in(grid, read_provenance=lambda name: {"runs": 9, "runs kept": 5})
-    with pytest.raises(ValueError, match="expected at least as many as the 5"):
-        grid.train_grid(SMALL, n_jobs=1)
+    with pytest.raises(ValueError, match="lose 1 published runs, plain/seed_1"):
+        grid.train_grid(SMALL._replace(cells=other), ["plain/seed_0"], n_jobs=1)
 
 
 def test_what_is_measured_of_policies_is_published_with_them(trained):

@@ -97,12 +97,12 @@ def test_the_answer_to_another_question_is_not_taken_under_its_name(tmp_path, ca
     assert "It is computed again" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", ["physics_fingerprint", "training_fingerprint"])
-def test_an_answer_of_another_fingerprint_is_not_taken(own_data, set_in, name):
+@pytest.mark.parametrize("what", ["physics", "training", "evaluation"])
+def test_an_answer_of_another_fingerprint_is_not_taken(own_data, set_in, what):
     compute = Mock(side_effect="ab")
     set_in(results, code_of=str)
     for fingerprint, answer in (("this", "a"), ("this", "a"), ("another", "b")):
-        set_in(results, **{name: Mock(return_value=fingerprint)})
+        set_in(results, **{f"{what}_fingerprint": Mock(return_value=fingerprint)})
         assert results.keep_all("some", compute, [({}, ())], 1)[0].value == answer
 
 
