@@ -104,5 +104,7 @@ def physics_fingerprint() -> str:
 @cache
 def evaluation_fingerprint() -> str:
     """Digest of what ``evaluate`` says of short episodes, 16 hexadecimal digits."""
-    rows = evaluate(policies.random, 3, max_picks=100).to_csv(index=False, float_format="%.3g")
+    rows = evaluate(policies.random, 3, max_picks=100).to_csv(
+        index=False, float_format="%.3g", lineterminator="\n"
+    )
     return blake2b(rows.encode(), digest_size=8).hexdigest()
