@@ -13,8 +13,7 @@ from studies.grid import cell_of
 from studies.results import read_table
 from studies.ties import choice
 from studies.ties.noise import DriftingTies, drifting, renewed
-from tests.agent.runs import assert_same, at_step, interrupt
-from unload import train
+from unload import check_resume
 from unload.agent.training import Training
 
 SMALL = replace(CONFIG, picks=64 * 40, batch_size=64, seed=3)
@@ -217,12 +216,8 @@ def test_noise_is_renewed_by_a_success_alone(correlation):
 
 
 @pytest.mark.parametrize("change", [partial(drifting, correlation=(0.9, 0.9, 0.99)), renewed])
-def test_a_resumed_run_has_the_same_bits(tmp_path, change):
-    train(UNBLURRED, tmp_path / "whole", progress=False, change=change)
-    with at_step(41, interrupt), pytest.raises(KeyboardInterrupt):
-        train(UNBLURRED, tmp_path / "parts", progress=False, change=change)
-    train(UNBLURRED, tmp_path / "parts", progress=False, change=change, same_code=True)
-    assert_same(tmp_path / "whole", tmp_path / "parts")
+def test_a_resumed_run_has_the_same_bits(change):
+    check_resume(UNBLURRED, change=change)
 
 
 @pytest.mark.parametrize("fields", [{"position_noise": 0.0005}, {"equalize": False}])
