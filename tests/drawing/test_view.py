@@ -12,7 +12,7 @@ from plotly.io import renderers
 
 from unload import Load, view
 from unload.drawing.picture import COLOURS
-from unload.drawing.view import _OTHER_COLOURS, _PLOTLY_MIMETYPE
+from unload.drawing.view import _OTHER_COLOURS, _PLOTLY_MIMETYPE, _short
 
 
 def items(trace) -> list[int]:
@@ -103,3 +103,9 @@ def test_a_script_is_told_how_to_see_a_view(small_load, monkeypatch):
 def test_bad_input_is_refused(small_load, kwargs, error, message):
     with pytest.raises(error, match=message):
         view(**({"load": small_load} | kwargs))
+
+
+def test_numbers_take_few_bytes_as_long_as_they_fit():
+    for most, kind in ((2**15 - 1, np.int16), (2**15, np.int32)):
+        numbers = _short(np.array([0, most]))
+        assert numbers.dtype == kind and numbers.tolist() == [0, most]
