@@ -9,6 +9,7 @@ from gymnasium.utils.env_checker import check_env
 
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, few_items, make_env
 from unload import ContainerEnv, plain
+from unload.env import observation
 from unload.env.highest_item import HighestItemVectorEnv
 from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import CONTACT_TOLERANCE
@@ -59,6 +60,9 @@ def test_positions_are_blurred_and_sunk(full_load):
     env = make_env().unwrapped
     env.reset(seed=0, options={"load": full_load})
     blur = env.observed_positions() - full_load.positions
+    env.observed_positions()[:] = 0  # a copy
+    assert np.array_equal(env.observed_positions(), full_load.positions + blur)
+    assert not observation.drift(3, 0.0, env.np_random).any(), "without noise nothing sinks"
     assert blur.std(axis=0) == pytest.approx(0.0005, rel=0.1)
     assert blur.mean(axis=0) == pytest.approx([0, 0, -0.001], abs=1e-4)
 
@@ -99,6 +103,19 @@ def test_a_copy_goes_on_alone_with_the_same_bits(kind, env_id, rng):
     assert_same(play(second), played)
     if env_id == CONTAINER:
         assert first.physics is env.physics, "the table is shared"
+
+
+@pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
+def test_an_environment_goes_on_from_what_another_one_keeps(env_id, rng):
+    one, other = (gymnasium.make_vec(env_id, 2, max_picks=5).unwrapped for _ in range(2))
+    actions = rng.integers(128, size=(8, 2))
+    for seed, env in enumerate((one, other)):
+        env.reset(seed=seed)
+    for action in actions[:2]:
+        one.step(action)
+    other.load_state_dict(deepcopy(one.state_dict()))
+    for action in actions[2:]:
+        assert_same(one.step(action), other.step(action))
 
 
 @pytest.mark.pybullet
