@@ -4,7 +4,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from studies import paths
@@ -152,10 +151,3 @@ def test_a_published_network_chooses_as_it_is_said_to():
     seen = evaluate_choice(policies[name], "frozen", True, see=equalize, **ranks)
     assert usual.pop("preference") < seen.pop("preference")  # it is asked of averaged ties
     assert usual == seen
-
-
-def test_the_laboratory_has_the_first_of_its_planned_seeds():
-    rows = pd.concat([read_table(f"order/{name}") for name in ("laboratory", "tuning")])
-    planned = laboratory.CELLS | laboratory.TUNED
-    for name, seeds in rows.groupby("cell")["seed"]:
-        assert seeds.tolist() == list(planned[name].seeds)[: len(seeds)], name

@@ -134,17 +134,6 @@ def test_published_choices_are_those_of_the_networks(networks, name):
         assert counts == pytest.approx(row.to_dict(), rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("name", "cells"),
-    [("choice_laboratory", choice.CHOICE_CELLS), ("mask_laboratory", choice.MASK_CELLS)],
-)
-def test_published_laboratory_runs_are_those_of_the_plan(name, cells):
-    seeds = {
-        cell: sorted(rows["seed"]) for cell, rows in read_table(f"ties/{name}").groupby("cell")
-    }
-    assert seeds == {cell: list(plan.seeds) for cell, plan in cells.items()}
-
-
 UNBLURRED = replace(CONFIG, picks=64 * 60, seed=3, position_noise=0.0)
 
 
