@@ -128,6 +128,15 @@ def test_a_run_of_the_fewest_picks_learns_in_its_last_step(replay_size, picks):
         replace(config, picks=picks - 4)
 
 
+def test_the_target_follows_at_the_first_step_after_so_many_picks():
+    fields = RUNS["container, gamma"] | {"target_update_interval": 26, "picks": 160}
+    run, followed = Training(TrainConfig(**fields)), []
+    run.agent.update_target = lambda: followed.append(run.rollout.picks)
+    while not run.rollout.finished:
+        run.step()
+    assert followed == [28, 52, 80, 104, 132, 156]
+
+
 def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, monkeypatch):
     """It once wrote infinite weights and counted as finished."""
     monkeypatch.setattr("unload.agent.training.CHECKPOINT_INTERVAL", 0)

@@ -180,6 +180,7 @@ def test_records_are_joined():
     together = results.joined([first, second])
     assert (together["runs"], together["wall_time_s"]) == (2, 30.5)
     assert together["revision"] == [first["revision"], "another"]
+    assert results.joined([together, first])["runs"] == 3
 
 
 def test_the_projects_own_commit_is_its_revision(tmp_path, monkeypatch):

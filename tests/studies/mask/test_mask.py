@@ -41,6 +41,13 @@ def test_containers_are_filled_at_different_steps():
         filled.append(int((after < before).sum()))
     run.rollout.close()
     assert max(filled[: task.MAX_PICKS]) <= 2 and sum(filled) >= 2 * task.NUM_ENVS - 2
+    assert np.diff(np.flatnonzero(filled)).max() < 10, "evenly spread"
+
+
+def test_early_and_late_are_those_of_the_plan():
+    plan = " ".join((paths.DATA / "mask/PLAN.md").read_text(encoding="utf-8").split())
+    assert f"before which fewer than {cells.EARLY.keywords['fewer_than']} boxes had" in plan
+    assert f"*late* ones those with {cells.LATE.keywords['least']} and more" in plan
 
 
 def test_a_network_is_judged_by_stage():

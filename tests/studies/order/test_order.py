@@ -9,7 +9,14 @@ import pytest
 from studies import paths
 from studies.grid import read_policies, read_provenance
 from studies.order import laboratory, training
-from studies.order.index import BY_ROWS, ROWS, index_by_rows, see_index, sorted_index
+from studies.order.index import (
+    BY_ROWS,
+    ROWS,
+    _order_of_rows,
+    index_by_rows,
+    see_index,
+    sorted_index,
+)
 from studies.results import read_table
 from studies.ties.choice import WAYS, evaluate_choice
 from unload import task
@@ -68,13 +75,23 @@ def test_a_run_chooses_by_what_it_remembers(rows):
     assert np.array_equal(stored, sorted_index(shown)) == (rows == "distance")
 
 
-def test_stacked_rows_stand_wall_by_wall():
-    run = Training(SMALL, change=BY_ROWS["wall"])
+@pytest.mark.parametrize("rows", ["wall", "height"])
+def test_rows_stand_wall_by_wall_or_the_highest_first(rows):
+    run = Training(SMALL, change=BY_ROWS[rows])
     shown, visible = run.rollout.observations.copy(), run.rollout.envs.unwrapped.visible
     run.step()
     run.rollout.close()
-    expected = index_by_rows(shown, np.argsort(visible, axis=1))
+    order = visible if rows == "wall" else -shown[..., 2]
+    expected = index_by_rows(shown, np.argsort(order, axis=1, kind="stable"))
     assert np.array_equal(run.replay.arrays["observations"][: task.NUM_ENVS], expected)
+
+
+def test_random_rows_are_others_at_each_step_and_the_same_for_all_who_ask():
+    run, found = Training(SMALL), []
+    for run.rollout.steps in (5, 6, 5):
+        found.append(_order_of_rows(run, run.rollout.observations, "random"))
+    run.rollout.close()
+    assert (found[0] != found[1]).any(axis=1).all() and np.array_equal(found[0], found[2])
 
 
 def test_an_update_in_four_steps():
