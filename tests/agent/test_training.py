@@ -11,10 +11,10 @@ import torch
 
 from tests.agent import runs
 from tests.agent.runs import CONTAINER, RUNS, HeightNetwork, assert_same, at_step, interrupt, metres
-from unload import TrainConfig, evaluate, load_policy, train
+from unload import TrainConfig, evaluate, load_policy, success_rate, train
 from unload.agent.curve import Curve, Point
 from unload.agent.rollout import Rollout
-from unload.agent.training import Training, warn_of_other_bits
+from unload.agent.training import Training, deferred_signals, warn_of_other_bits
 from unload.checkpoint.folder import RunFolder
 from unload.env.vector import ContainerVectorEnv
 from unload.support import files
@@ -179,8 +179,15 @@ def test_a_pipe_is_refused(tmp_path):
         train(TrainConfig(**CONTAINER), tmp_path, progress=False)
 
 
-def test_a_policy_before_the_first_point_has_no_msr():
-    assert Training(TrainConfig(**CONTAINER)).policy().card["msr"] == {}
+def test_a_policy_is_a_copy_and_before_the_first_point_has_no_msr():
+    run = Training(TrainConfig(**CONTAINER))
+    policy = run.policy()
+    assert policy.card["msr"] == {} and run.agent.network.training
+    before = runs.weights(policy.network)
+    for _ in range(6):
+        run.step()
+    assert all(map(torch.equal, runs.weights(policy.network), before))
+    assert not torch.equal(runs.weights(run.agent.network)[0], before[0])
 
 
 def test_a_folder_in_use_is_refused(tmp_path):
@@ -190,11 +197,16 @@ def test_a_folder_in_use_is_refused(tmp_path):
 
 
 def test_the_success_rate_counts_positive_rewards():
-    """A task of one's own need not reward picks by ±1."""
+    """A task of one's own need not reward picks by ±1; where it does, bits are those of the MSR."""
     curve = Curve()
-    curve.add(np.array([3.0, 1.0, 1.0, -1.0]), np.zeros(4, bool), [])
+    curve.add(np.array([3.0, 1.0, 0.0, -1.0]), np.zeros(4, bool), [])
     curve.end_point(4, 1.0)
-    assert curve.points[0][1:3] == (1, 0.75)
+    assert curve.points[0][1:3] == (0.75, 0.5)
+    for successes in range(60):
+        rewards = np.where(np.arange(60) < successes, 1.0, -1.0)
+        curve.add(rewards, np.zeros(60, bool), [])
+        curve.end_point(60, 1.0)
+        assert curve.points[-1].success_rate == success_rate(rewards)
 
 
 @pytest.mark.parametrize("stop", [False, np.False_])
@@ -298,6 +310,12 @@ def test_weights_that_a_callback_spoils_are_not_kept(tmp_path, stop):
         train(TrainConfig(**CONTAINER), tmp_path, False, callback=callback, change=started.append)
     assert {path.name for path in tmp_path.iterdir()} <= {"curve.csv", "lock"}
     assert started[0].rollout.envs.closed
+
+
+def test_one_ctrl_c_after_the_last_step_is_not_forgotten():
+    with pytest.raises(KeyboardInterrupt), deferred_signals() as received:
+        interrupt()
+        assert received == [signal.SIGINT]
 
 
 def test_a_second_ctrl_c_stops_at_once(tmp_path, monkeypatch):
