@@ -283,7 +283,7 @@ def test_the_last_pick_of_an_episode_leads_to_its_own_end(boxes, monkeypatch):
     picks, _ = rollout.pick(np.array([1]))
     assert np.flatnonzero(picks["next_masks"]).tolist() == [0, 1]
     assert np.array_equal(picks["next_observations"], picks["observations"])
-    assert rollout.allowed.sum() == 3
+    assert rollout.allowed.sum() == 3 and picks["terminations"].tolist() == [False]
 
 
 @pytest.mark.parametrize(("found", "count"), [("DEFAULT", 1), ("AVX2", 0), ("AVX512", 0)])
