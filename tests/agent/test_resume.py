@@ -134,9 +134,7 @@ class Forgetful(PEQNetwork):
 
 
 KEPT = {
-    "array of kept in a closure": {
-        "change": counting(lambda run: run.kept.setdefault("count", np.zeros(1)))
-    },
+    "array of kept in a closure": {"change": counting(count_in_kept)},
     "array of kept that grows": {"change": grow_in_kept},
     "array of kept that comes late": {"change": adding(late_in_kept)},
     "run's generator": {"change": adding(lambda run: run.rng.random())},

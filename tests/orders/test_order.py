@@ -158,13 +158,6 @@ def test_the_rule_in_the_docstring_works(small_load):
         present[item] = False
 
 
-def test_where_boxes_block_each_other_in_a_circle_none_is_lifted_with_another_on_it():
-    tall, foot, plank, high, far = range(5)
-    order = picking_order(of_corners(*CIRCLE))
-    assert order["item"].tolist() == [tall, high, plank, foot, far]
-    assert order["behind"].tolist() == [True, False, False, False, False]
-
-
 @pytest.mark.parametrize("stops", [["1", "", "B"], [1, None, np.inf]])
 def test_boxes_without_the_number_of_a_stop_are_counted_and_the_first_is_named(boxes, stops):
     load = boxes((0.3, 0.2), (0.8, 0.2), (1.3, 0.2))

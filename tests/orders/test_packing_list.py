@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from unload import Load, read_load, stack_load
+from unload import Load, read_load
 from unload.load.boxes import _SMALLEST_EDGE
 from unload.orders.packing_list import ListError
 
@@ -68,13 +68,6 @@ def test_names_and_units(written, columns, factor, arguments):
     numbers = (cells.iloc[:, 1:].astype(float) * factor).map(repr)
     lines = pd.concat([cells[0], numbers], axis=1).agg(",".join, axis=1)
     assert_same(read_load(written(*lines, columns=columns), **arguments), expected)
-
-
-def test_the_units_of_names_come_before_those_of_the_argument(written):
-    columns = "id,x_min,y_min,z_min,length_mm,width_cm,height_mm"
-    load = read_load(written("a,6,0.1,0,500,40,300", columns=columns), units="m")
-    assert load.sizes.tolist() == [[0.5, 0.4, 0.3]]
-    assert load.positions[0] == pytest.approx([6.25, 0.3, 0.15])
 
 
 def test_a_table_is_a_list_too(written):
@@ -142,13 +135,6 @@ def test_small_faults_are_settled_and_logged(written, caplog):
     bridge = "e,0,0,1.001,1,2,1"  # stands on the higher of two boxes, and holds down both
     load = read_load(written("a,0,0,0,1,1,1", "d,0,1,0,1,1,1.001", bridge))
     assert load.covered(np.ones(3, bool)).tolist() == [True, True, False]
-
-
-def test_a_paper_s_load_with_3_mm_of_noise_is_read(rng):
-    load = stack_load(rng)
-    low = load.positions - load.sizes / 2 + rng.uniform(-0.003, 0.003, load.positions.shape)
-    table = pd.DataFrame(np.hstack([low, load.sizes]), columns=CORNERS.split(","))
-    assert len(read_load(table)) == len(load)
 
 
 def test_other_columns_are_kept(written):
