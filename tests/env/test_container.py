@@ -33,9 +33,12 @@ def test_a_physics_of_ones_own_stands_in_the_spec():
 @pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
 def test_a_single_environment_is_the_plain_one(env_id, rng):
     container = env_id == CONTAINER
-    own = {"stack": lambda rng: few_items(rng, 140)} if container else {}
-    env = make_env(env_id, max_picks=150, **own).unwrapped
-    page = (plain.Container if container else plain.HighestItem)(max_picks=150, **own)
+    # One is emptied, the other one goes on until it is cut off.
+    own = {"max_picks": 50}
+    if container:
+        own = {"max_picks": 999, "stack": lambda rng: few_items(rng, 140)}
+    env = make_env(env_id, **own).unwrapped
+    page = (plain.Container if container else plain.HighestItem)(**own)
     result = env.reset(seed=3)
     assert_same(result, page.reset(seed=3))
     ended = False
@@ -50,6 +53,7 @@ def test_a_single_environment_is_the_plain_one(env_id, rng):
             assert_same(env.observed_positions(), page.positions)
             assert_same(env.present, page.present)
         ended = result[2] or result[3]
+    assert result[2] == container
     with pytest.raises(ResetNeeded, match="the episode is finished; call reset first"):
         env.step(0)
     assert_same(env.reset(), page.reset())

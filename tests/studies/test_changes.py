@@ -22,7 +22,6 @@ def run_of(change, steps=3, config=SMALL):
     for _ in range(steps):
         seen.append(run.rollout.observations.copy())
         run.step()
-    run.rollout.close()
     return run, np.concatenate(seen)
 
 
@@ -33,8 +32,7 @@ def asking():
     run.agent.learner.best_actions = lambda observations, allowed: (
         asked.append(observations) or np.zeros(len(allowed), np.int64)
     )
-    yield run, asked
-    run.rollout.close()
+    return run, asked
 
 
 def remembered(run):

@@ -96,7 +96,6 @@ def test_a_slope_is_kept_from_sinking(cell, scaled):
             if step == 19:  # it sinks; one look follows, after step 30
                 with torch.no_grad():
                     run.agent.network.extractor.weight[:, 2] *= 0.2
-        run.rollout.close()
         weights[name] = run.agent.network.extractor.weight.detach().abs().sum(dim=0)
     # What is learned in eleven steps in between differs a little, too.
     ratio = (weights["held"] / weights["plain"]).numpy()

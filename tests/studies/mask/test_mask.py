@@ -26,7 +26,6 @@ def test_only_picks_of_a_stage_are_stored_and_none_twice(least, fewer_than):
         unloaded, seen = envs._containers.unloaded.copy(), run.rollout.observations.copy()
         run.step()
         expected.append(seen[(unloaded >= least) & (unloaded < fewer_than)])
-    run.rollout.close()
     wanted = np.concatenate(expected)
     assert 0 < len(wanted) == run.replay.total < 20 * task.NUM_ENVS
     assert np.array_equal(run.replay.arrays["observations"][: len(wanted)], wanted)
@@ -39,7 +38,6 @@ def test_containers_are_filled_at_different_steps():
         run.step()
         after = run.rollout.envs.unwrapped._containers.unloaded
         filled.append(int((after < before).sum()))
-    run.rollout.close()
     assert max(filled[: task.MAX_PICKS]) <= 2 and sum(filled) >= 2 * task.NUM_ENVS - 2
     assert np.diff(np.flatnonzero(filled)).max() < 10, "evenly spread"
 

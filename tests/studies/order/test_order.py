@@ -68,7 +68,6 @@ def test_a_run_chooses_by_what_it_remembers(rows):
     BY_ROWS[rows](run)
     shown = run.rollout.observations.copy()
     run.step()
-    run.rollout.close()
     stored = run.replay.arrays["observations"][: task.NUM_ENVS]
     assert np.array_equal(stored, asked[0])
     assert np.array_equal(np.sort(stored, axis=1), np.sort(shown, axis=1))
@@ -80,7 +79,6 @@ def test_rows_stand_wall_by_wall_or_the_highest_first(rows):
     run = Training(SMALL, change=BY_ROWS[rows])
     shown, visible = run.rollout.observations.copy(), run.rollout.envs.unwrapped.visible
     run.step()
-    run.rollout.close()
     order = visible if rows == "wall" else -shown[..., 2]
     expected = index_by_rows(shown, np.argsort(order, axis=1, kind="stable"))
     assert np.array_equal(run.replay.arrays["observations"][: task.NUM_ENVS], expected)
@@ -90,7 +88,6 @@ def test_random_rows_are_others_at_each_step_and_the_same_for_all_who_ask():
     run, found = Training(SMALL), []
     for run.rollout.steps in (5, 6, 5):
         found.append(_order_of_rows(run, run.rollout.observations, "random"))
-    run.rollout.close()
     assert (found[0] != found[1]).any(axis=1).all() and np.array_equal(found[0], found[2])
 
 
@@ -103,7 +100,6 @@ def test_an_update_in_four_steps():
             before = run.curve.sums["updates"]
             run.step()
             updates += run.curve.sums["updates"] != before
-        run.rollout.close()
         counts.append(updates)
     assert counts == [20, 5]
 
@@ -115,7 +111,6 @@ def test_what_touches_a_picked_box_is_displaced_for_good(see):
     for _ in range(30):
         for each in (run, plain):
             each.step()
-    run.rollout.close(), plain.rollout.close()
     moved, usual = (each.replay.arrays["observations"] for each in (run, plain))
     assert np.array_equal(moved[:64], usual[:64])  # nothing has been picked yet
     assert (moved[64:128] != usual[64:128]).any()

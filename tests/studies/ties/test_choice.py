@@ -66,7 +66,6 @@ def test_the_choice_and_the_memory_have_noise_of_their_own(at_choice, stored):
     run.agent.learner.best_actions = note
     for _ in range(4):
         run.step()
-    run.rollout.close()
     learned = run.replay.arrays["observations"][: 4 * 64].reshape(4, 64, 128, 3)
     assert (learned == chosen).all() == (at_choice == stored)
     # Where nothing was unloaded, frozen noise shows the same again, and noise anew something else.
@@ -82,7 +81,6 @@ def test_no_deadlocked_pick_is_stored():
     for training in (run, usual):
         for _ in range(30):
             training.step()
-        training.rollout.close()
     assert usual.curve.sums["deadlocked"] > 300 and run.curve.sums["deadlocked"] > 300
     assert len(run.replay) == len(usual.replay) == 30 * 64
     # What one container shows changes with a success alone, so that of the same observation and
@@ -109,7 +107,6 @@ def test_a_container_is_filled_anew_at_a_deadlock():
         assert run.rollout.masks[deadlocked].all() and (envs._picks == step + 1).all()
         assert (run.rollout.observations == envs._copy_observations()).all()
     assert deadlocks > 100
-    run.rollout.close()
 
 
 def test_published_choices_are_of_all_networks_and_ways(networks):
@@ -139,9 +136,7 @@ UNBLURRED = replace(CONFIG, picks=64 * 60, seed=3, position_noise=0.0)
 
 @pytest.fixture
 def run():
-    made = Training(UNBLURRED)
-    yield made
-    made.rollout.close()
+    return Training(UNBLURRED)
 
 
 def orders(run: Training, correlation: float, picks: int) -> np.ndarray:
@@ -184,7 +179,6 @@ def test_what_is_chosen_by_is_what_is_learned_from():
     stored = run.replay.arrays["observations"][:64], run.replay.arrays["actions"][:64]
     best = run.agent.learner.best_actions(stored[0], np.ones((64, 128), bool))
     assert (stored[1] == best).all() and (stored[0] != before).any(axis=(1, 2)).all()
-    run.rollout.close()
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
@@ -201,7 +195,6 @@ def test_noise_is_renewed_by_a_success_alone(correlation):
         assert ((run.kept["ties"] == offsets).all(axis=(1, 2)) == failed).all()
         assert ((now == before).all(axis=(1, 2)) == failed).all()
         assert failed.any() == (step not in (0, 20)) and not failed.all()
-    run.rollout.close()
 
 
 @pytest.mark.parametrize("change", [partial(drifting, correlation=(0.9, 0.9, 0.99)), renewed])
