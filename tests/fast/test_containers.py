@@ -17,12 +17,15 @@ def test_containers_are_emptied_as_on_the_page(settings):
 
 
 def test_a_box_that_moves_by_exactly_the_threshold_is_unloaded():
+    """One that moves by less moves by as much again, whatever the physics knows."""
     envs = ContainerVectorEnv(2)
     envs.reset(seed=0)
     distances = np.array([0.2, np.nextafter(0.2, 0)])
     state, actions = envs._containers, np.zeros(2, np.int64)
     rewards = containers.unload_lifted(state, actions, distances, False, False)
     assert rewards.tolist() == [1, -1] and state.unloaded.tolist() == [1, 0]
+    again = containers.look_up(state, actions, *containers.NOTHING_KNOWN)[1]
+    assert again.tolist() == [containers.UNKNOWN, distances[1]]
 
 
 @pytest.mark.parametrize("physics", [None, TablePhysics(LiftTable())])
