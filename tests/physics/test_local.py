@@ -97,6 +97,9 @@ def test_a_world_that_is_cleared_gives_the_same(situations, monkeypatch):
         assert physics.simulate(situation) == distance
         assert physics._world.bodies <= len(situation.boxes) + 6
     assert fresh._world.bodies > 30
+    fresh._world.add_box((0, 0, 0), (1, 1, 1), 1.0)
+    fresh._world.clear()
+    assert fresh._world.client.getNumBodies() == fresh._world.bodies == 0
 
 
 class Half(LocalPhysics):
