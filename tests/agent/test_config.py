@@ -10,8 +10,9 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from unload import ContainerEnv, TrainConfig, train
-from unload.agent.config import ENVS, EXPLORATION_FRACTION
+from unload.agent.config import ENVS, EXPLORATION_FRACTION, settings_of_run
 from unload.env.vector import ContainerVectorEnv
+from unload.physics.bullet import ENGINES
 
 
 def test_the_papers_configuration_is_the_default():
@@ -41,6 +42,12 @@ def test_a_run_draws_other_loads_than_an_evaluation_of_its_seed():
     seeds = TrainConfig(seed=3).seeds()
     assert len({*seeds}) == 3 and not {*seeds} & {*TrainConfig(seed=4).seeds()}
     assert not {*seeds} & {*np.random.SeedSequence(3).generate_state(3).tolist()}
+
+
+def test_settings_name_an_engine_that_is_not_the_reference_where_something_is_lifted(monkeypatch):
+    monkeypatch.setattr("unload.agent.config.engine_of", lambda: ENGINES[1])
+    assert settings_of_run(TrainConfig())["engine"] == ENGINES[1]
+    assert "engine" not in settings_of_run(TrainConfig("unload/HighestItem-v0"))
 
 
 COUNTS = ("picks", "num_envs", "batch_size", "n_features", "target_update_interval", "max_picks")

@@ -12,12 +12,12 @@ def test_random_is_uniform_over_the_allowed(rng):
 
 
 def test_nearest_takes_the_first_allowed_row_and_highest_the_highest(rng):
-    observations = np.zeros((3, 4, 3))
+    observations = np.zeros((4, 4, 3))
     observations[..., 2] = [-0.9, 0.1, 0.8, 0.2]
-    masks = np.array([[1, 1, 1, 1], [1, 1, 0, 0], [0, 0, 0, 1]])
-    assert policies.nearest(observations, masks, rng).tolist() == [0, 0, 3]
+    masks = np.array([[1, 1, 1, 1], [1, 1, 0, 0], [0, 0, 0, 1], [1, 0, 0, 0]])
+    assert policies.nearest(observations, masks, rng).tolist() == [0, 0, 3, 0]
     actions = policies.highest(observations, masks, rng)
-    assert actions.tolist() == [2, 1, 3] and actions.dtype == np.int64
+    assert actions.tolist() == [2, 1, 3, 0] and actions.dtype == np.int64
 
 
 @pytest.mark.parametrize("policy", [policies.random, policies.nearest, policies.highest])

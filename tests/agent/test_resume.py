@@ -28,15 +28,24 @@ def adding(next_bonus):
     return change
 
 
+def counting(holder):
+    """A change that counts the steps in the first number of a list or array, ``holder(run)``."""
+
+    def change(run):
+        held = holder(run)
+
+        def bonus(run):
+            held[0] += 1
+            return held[0]
+
+        adding(bonus)(run)
+
+    return change
+
+
 def count_in_kept(run):
     """An array that is put back in place, so that a closure may hold it."""
-    count = run.kept["count"] = np.zeros(1)
-
-    def bonus(run):
-        count[:] += 1
-        return count[0]
-
-    adding(bonus)(run)
+    return run.kept.setdefault("count", np.zeros(1))
 
 
 def grow_in_kept(run):
@@ -125,7 +134,7 @@ class Forgetful(PEQNetwork):
 
 
 KEPT = {
-    "array of kept in a closure": {"change": count_in_kept},
+    "array of kept in a closure": {"change": counting(count_in_kept)},
     "array of kept that grows": {"change": grow_in_kept},
     "array of kept that comes late": {"change": adding(late_in_kept)},
     "run's generator": {"change": adding(lambda run: run.rng.random())},
@@ -155,66 +164,18 @@ def test_what_is_kept_goes_on_with_the_same_bits(given):
     check_resume(replace(CONFIG, **fields), change=change)
 
 
-def nonlocal_count(run):
-    count = 0
-
-    def bonus(run):
-        nonlocal count
-        count += 1
-        return count
-
-    adding(bonus)(run)
-
-
-def count_in_partial(run):
-    adding(partial(lambda held, run: held.append(0) or len(held), []))(run)
-
-
-def count_in_default(run):
-    def bonus(run, held=[]):  # noqa: B006
-        held.append(0)
-        return len(held)
-
-    adding(bonus)(run)
-
-
 GLOBAL = [0]
 
 
-def count_in_global(run=None):
-    GLOBAL[0] += 1
-    return GLOBAL[0]
-
-
-def count_in_attribute(run):
-    run.own = getattr(run, "own", 0) + 1
-    return run.own
-
-
 class Holder:
-    count = 0
+    count = [0]
 
 
-def count_in_class(run):
-    Holder.count += 1
-    return Holder.count
-
-
-def count_in_config(run):
-    object.__setattr__(run.config, "own", getattr(run.config, "own", 0) + 1)
-    return run.config.own
-
-
-def view_in_kept(run):
-    """The other half of the array is not kept."""
+def half_in_kept(run):
+    """Of two numbers in one array the other one is kept."""
     base = np.zeros(2)
-    run.kept["view"] = base[:1]
-
-    def bonus(run):
-        base[:] += 1
-        return base[1]
-
-    adding(bonus)(run)
+    run.kept["view"] = base[1:]
+    return base
 
 
 def hooked(run):
@@ -229,10 +190,6 @@ def frozen(run):
     return 0
 
 
-def spawned(run):
-    return run.rng.spawn(1)[0].random()
-
-
 class CountingCalls(PEQNetwork):
     """In an attribute, not in a buffer."""
 
@@ -244,7 +201,8 @@ class CountingCalls(PEQNetwork):
 
 
 def counting_stack(rng):
-    return stack_load(rng, walls=1 + count_in_global() % 5)
+    GLOBAL[0] += 1
+    return stack_load(rng, walls=1 + GLOBAL[0] % 5)
 
 
 class Plain(PEQNetwork):
@@ -252,19 +210,21 @@ class Plain(PEQNetwork):
 
 
 NOT_KEPT = {
-    "nonlocal": {"change": nonlocal_count},
-    "list in a partial": {"change": count_in_partial},
-    "list as a default": {"change": count_in_default},
-    "global": {"change": adding(count_in_global)},
-    "attribute of the run": {"change": adding(count_in_attribute)},
-    "attribute of a class": {"change": adding(count_in_class)},
-    "attribute of the configuration": {"change": adding(count_in_config)},
-    "base of a kept view": {"change": view_in_kept},
+    "closure": {"change": counting(lambda run: [0])},
+    "list in a partial": {"change": counting(partial(lambda held, run: held, [0]))},
+    "list as a default": {"change": counting(lambda run, held=[0]: held)},  # noqa: B006
+    "global": {"change": counting(lambda run: GLOBAL)},
+    "attribute of the run": {"change": counting(lambda run: vars(run).setdefault("own", [0]))},
+    "attribute of a class": {"change": counting(lambda run: Holder.count)},
+    "attribute of the configuration": {
+        "change": counting(lambda run: vars(run.config).setdefault("own", [0]))
+    },
+    "base of a kept view": {"change": counting(half_in_kept)},
     "closure of a hook": {"change": hooked, "network": Plain},
     "frozen later": {"change": adding(frozen), "network": Plain},
     "NumPy's global generator": {"change": adding(lambda run: np.random.rand())},
     "Python's global generator": {"change": adding(lambda run: random.random())},
-    "children of a generator": {"change": adding(spawned)},
+    "children of a generator": {"change": adding(lambda run: run.rng.spawn(1)[0].random())},
     "sample of a space": {"change": adding(lambda run: run.rollout.envs.action_space.sample()[0])},
     "attribute of a network": {"network": CountingCalls},
     "global of a stack": {"stack": counting_stack, "env": "unload/Container-v0"},

@@ -11,10 +11,10 @@ import torch
 
 from tests.agent import runs
 from tests.agent.runs import CONTAINER, RUNS, HeightNetwork, assert_same, at_step, interrupt, metres
-from unload import TrainConfig, evaluate, load_policy, train
+from unload import TrainConfig, evaluate, load_policy, success_rate, train
 from unload.agent.curve import Curve, Point
 from unload.agent.rollout import Rollout
-from unload.agent.training import Training, warn_of_other_bits
+from unload.agent.training import Training, deferred_signals, warn_of_other_bits
 from unload.checkpoint.folder import RunFolder
 from unload.env.vector import ContainerVectorEnv
 from unload.support import files
@@ -128,6 +128,15 @@ def test_a_run_of_the_fewest_picks_learns_in_its_last_step(replay_size, picks):
         replace(config, picks=picks - 4)
 
 
+def test_the_target_follows_at_the_first_step_after_so_many_picks():
+    fields = RUNS["container, gamma"] | {"target_update_interval": 26, "picks": 160}
+    run, followed = Training(TrainConfig(**fields)), []
+    run.agent.update_target = lambda: followed.append(run.rollout.picks)
+    while not run.rollout.finished:
+        run.step()
+    assert followed == [28, 52, 80, 104, 132, 156]
+
+
 def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, monkeypatch):
     """It once wrote infinite weights and counted as finished."""
     monkeypatch.setattr("unload.agent.training.CHECKPOINT_INTERVAL", 0)
@@ -170,8 +179,15 @@ def test_a_pipe_is_refused(tmp_path):
         train(TrainConfig(**CONTAINER), tmp_path, progress=False)
 
 
-def test_a_policy_before_the_first_point_has_no_msr():
-    assert Training(TrainConfig(**CONTAINER)).policy().card["msr"] == {}
+def test_a_policy_is_a_copy_and_before_the_first_point_has_no_msr():
+    run = Training(TrainConfig(**CONTAINER))
+    policy = run.policy()
+    assert policy.card["msr"] == {} and run.agent.network.training
+    before = runs.weights(policy.network)
+    for _ in range(6):
+        run.step()
+    assert all(map(torch.equal, runs.weights(policy.network), before))
+    assert not torch.equal(runs.weights(run.agent.network)[0], before[0])
 
 
 def test_a_folder_in_use_is_refused(tmp_path):
@@ -181,11 +197,16 @@ def test_a_folder_in_use_is_refused(tmp_path):
 
 
 def test_the_success_rate_counts_positive_rewards():
-    """A task of one's own need not reward picks by ±1."""
+    """A task of one's own need not reward picks by ±1; where it does, bits are those of the MSR."""
     curve = Curve()
-    curve.add(np.array([3.0, 1.0, 1.0, -1.0]), np.zeros(4, bool), [])
+    curve.add(np.array([3.0, 1.0, 0.0, -1.0]), np.zeros(4, bool), [])
     curve.end_point(4, 1.0)
-    assert curve.points[0][1:3] == (1, 0.75)
+    assert curve.points[0][1:3] == (0.75, 0.5)
+    for successes in range(60):
+        rewards = np.where(np.arange(60) < successes, 1.0, -1.0)
+        curve.add(rewards, np.zeros(60, bool), [])
+        curve.end_point(60, 1.0)
+        assert curve.points[-1].success_rate == success_rate(rewards)
 
 
 @pytest.mark.parametrize("stop", [False, np.False_])
@@ -207,25 +228,20 @@ def test_a_callback_watches_a_run_and_may_end_it(tmp_path, monkeypatch, stop):
 
 
 @pytest.mark.parametrize("picks", [100, 200])
-def test_whatever_a_callback_raises_loses_no_pick(tmp_path, monkeypatch, picks):
-    """Nor is it called twice for one; also after the last, and wherever it has gone meanwhile."""
+def test_whatever_a_callback_raises_loses_no_pick(tmp_path, picks):
+    """Nor is it called twice for one; also after the last."""
     config, steps = TrainConfig(**CONTAINER), []
 
     def callback(point):
-        os.chdir(tmp_path / "elsewhere")
         steps.append(point["picks"])
         if len(steps) == picks // 20:
             raise OSError("no more")
 
-    (tmp_path / "elsewhere").mkdir()
-    monkeypatch.chdir(tmp_path)
     usual = {"progress": False, "callback": callback}
     with pytest.raises(OSError, match="no more"):
-        train(config, "run", **usual)
-    monkeypatch.chdir(tmp_path)
-    train(config, "run", **usual)
+        train(config, tmp_path / "run", **usual)
+    train(config, tmp_path / "run", **usual)
     assert steps == list(range(20, 201, 20))
-    assert not list((tmp_path / "elsewhere").iterdir())
     train(config, tmp_path / "straight", progress=False)
     assert_same(tmp_path / "straight", tmp_path / "run")
 
@@ -262,7 +278,7 @@ def test_the_last_pick_of_an_episode_leads_to_its_own_end(boxes, monkeypatch):
     picks, _ = rollout.pick(np.array([1]))
     assert np.flatnonzero(picks["next_masks"]).tolist() == [0, 1]
     assert np.array_equal(picks["next_observations"], picks["observations"])
-    assert rollout.allowed.sum() == 3
+    assert rollout.allowed.sum() == 3 and picks["terminations"].tolist() == [False]
 
 
 @pytest.mark.parametrize(("found", "count"), [("DEFAULT", 1), ("AVX2", 0), ("AVX512", 0)])
@@ -289,6 +305,12 @@ def test_weights_that_a_callback_spoils_are_not_kept(tmp_path, stop):
         train(TrainConfig(**CONTAINER), tmp_path, False, callback=callback, change=started.append)
     assert {path.name for path in tmp_path.iterdir()} <= {"curve.csv", "lock"}
     assert started[0].rollout.envs.closed
+
+
+def test_one_ctrl_c_after_the_last_step_is_not_forgotten():
+    with pytest.raises(KeyboardInterrupt), deferred_signals() as received:
+        interrupt()
+        assert received == [signal.SIGINT]
 
 
 def test_a_second_ctrl_c_stops_at_once(tmp_path, monkeypatch):

@@ -12,9 +12,9 @@ import pytest
 
 from tests.agent.runs import CONTAINER, assert_same, few_walls, interrupt_run, kill_run, metres
 from unload import TrainConfig, stack_load, train
-from unload.agent.config import settings_of_run
+from unload.checkpoint.folder import RunFolder
 from unload.checkpoint.settings import package
-from unload.physics.bullet import ENGINES, engine_of
+from unload.physics.bullet import ENGINES
 from unload.support import files
 
 
@@ -32,16 +32,22 @@ def test_a_killed_run_goes_on_with_the_same_bits(tmp_path):
     assert not [*(tmp_path / "killed").glob("checkpoint*")]
 
 
-def test_a_run_is_not_gone_on_with_by_another_engine(tmp_path, monkeypatch):
-    """Its name stands in the run's settings and on the card, unless it is the reference."""
+@pytest.mark.parametrize(("begun_by", "other"), [ENGINES, ENGINES[::-1]])
+def test_a_run_is_not_gone_on_with_by_another_engine(tmp_path, monkeypatch, begun_by, other):
+    """Its name stands in the run's settings, unless it is the reference."""
     config = TrainConfig(**CONTAINER)
+    monkeypatch.setattr("unload.agent.config.engine_of", lambda: begun_by)
     interrupt_run(config, tmp_path, 3)
-    (other,) = {*ENGINES} - {engine_of()}
     monkeypatch.setattr("unload.agent.config.engine_of", lambda: other)
     with pytest.raises(ValueError, match=r"engine \(.* not .*\)"):
         train(config, tmp_path, progress=False)
-    heights = replace(config, env="unload/HighestItem-v0")
-    assert "engine" not in settings_of_run(heights), "nothing is lifted there"
+
+
+def test_a_folder_stays_the_same_one_wherever_the_process_goes(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = RunFolder("run", {})
+    monkeypatch.chdir("/")
+    assert folder.path == folder.policy.parent == tmp_path / "run"
 
 
 @pytest.mark.parametrize("finished", [True, False])
@@ -150,18 +156,18 @@ def stop(point):
     raise RuntimeError("a callback has failed")
 
 
-def named(run, by: float) -> None:
+def named(run, by: float, of: int) -> None:
     """A change that leaves all as it is."""
 
 
 @pytest.mark.parametrize(("by", "other"), [(1, True), (1, 1.0), (0.0, -0.0), (float("nan"), 0.0)])
 def test_numbers_that_python_holds_equal_are_told_apart(tmp_path, by, other):
-    """And not-a-number is the same again."""
-    config = TrainConfig(**CONTAINER)
-    train(config, tmp_path, progress=False, change=partial(named, by=by))
+    """Not-a-number is the same again, and so are arguments in another order."""
+    config, usual = TrainConfig(**CONTAINER), {"progress": False, "same_code": True}
+    train(config, tmp_path, **usual, change=partial(named, by=by, of=1))
     with pytest.raises(ValueError, match="holds a run of another configuration: change"):
-        train(config, tmp_path, progress=False, same_code=True, change=partial(named, by=other))
-    train(config, tmp_path, progress=False, same_code=True, change=partial(named, by=by))
+        train(config, tmp_path, **usual, change=partial(named, by=other, of=1))
+    train(config, tmp_path, **usual, change=partial(named, of=1, by=by))
 
 
 @pytest.mark.parametrize("finished", [True, False])

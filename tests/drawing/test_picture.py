@@ -4,14 +4,16 @@ import numpy as np
 import pytest
 
 from tests.load.walls import of_corners
-from unload import task
+from unload import Load, task
 from unload.drawing import picture
 from unload.drawing.picture import (
     COLOURS,
     CORNERS,
     EYE,
+    SEAM,
     TARGET,
     back_to_front,
+    corners,
     project,
     snapshot,
 )
@@ -50,6 +52,13 @@ def test_a_snapshot_shows_the_present_boxes_where_they_are(boxes):
     assert 100 < lower < (picture != empty).any(axis=2).sum()
     assert (snapshot(load, both, moved.positions) == snapshot(moved, both, moved.positions)).all()
     assert (snapshot(load, both, moved.positions) != picture).any()
+    larger = Load(load.positions, load.sizes, container=2 * task.CONTAINER)
+    assert (snapshot(larger, both, load.positions) != picture).any(), "from farther away"
+
+
+def test_a_box_that_is_thinner_than_the_seam_is_drawn_half_as_thick():
+    low, high = corners(of_corners([(0, 0, 0)], [(1, 1, 0.004)]), np.arange(1))
+    assert (high - low)[0] == pytest.approx([1 - SEAM, 1 - SEAM, 0.002])
 
 
 def test_what_stands_upright_is_drawn_upright():

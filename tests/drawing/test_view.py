@@ -12,7 +12,7 @@ from plotly.io import renderers
 
 from unload import Load, view
 from unload.drawing.picture import COLOURS
-from unload.drawing.view import _OTHER_COLOURS, _PLOTLY_MIMETYPE
+from unload.drawing.view import _OTHER_COLOURS, _PLOTLY_MIMETYPE, _short
 
 
 def items(trace) -> list[int]:
@@ -36,13 +36,15 @@ def test_a_mesh_holds_the_boxes_of_one_colour(full_load):
 @pytest.mark.parametrize("length", [7.0, 14.0])
 def test_the_container_has_its_true_proportions(boxes, length):
     load = boxes((1.0, 0.2))
-    scene = view(Load(load.positions, load.sizes, container=(length, 2.5, 2.5))).layout.scene
+    figure = view(Load(load.positions, load.sizes, container=(length, 2.5, 2.5)))
+    scene = figure.layout.scene
     drawn = np.array([scene.aspectratio[axis] for axis in "xyz"])
     assert scene.aspectmode == "manual"
     assert drawn == pytest.approx([2.8, 2.8 * 2.5 / length, 2.8 * 2.5 / length])
     ranges = [np.ptp(scene[f"{axis}axis"].range) for axis in "xyz"]
     assert ranges == pytest.approx([length, 2.5, 2.5])
     assert scene.camera.eye.x * drawn[0] / 2.8 > drawn[0] / 2, "from outside"
+    assert (figure.picture() == view(load).picture()) == (length == 7), "the still picture, too"
 
 
 def test_of_two_groups_the_later_one_wins_and_one_may_be_empty(small_load):
@@ -56,6 +58,13 @@ def test_of_two_groups_the_later_one_wins_and_one_may_be_empty(small_load):
     colours = COLOURS | dict(zip(others, _OTHER_COLOURS))
     for trace in figure.data:
         assert trace.color == to_hex(colours[trace.name])
+
+
+def test_the_first_ten_picks_of_an_order_have_their_numbers(small_load):
+    figure = view(small_load, order=np.arange(20)[::-1])
+    shown = {trace.name: items(trace) for trace in figure.data}
+    assert [*shown] == [*(f"pick {number}" for number in range(1, 11)), "picked later"]
+    assert [shown[f"pick {number}"] for number in (1, 2, 10)] == [[19], [18], [10]]
 
 
 def test_ipython_displays_a_figure_and_a_picture_in_little_room_and_without_a_network(full_load):
@@ -94,3 +103,9 @@ def test_a_script_is_told_how_to_see_a_view(small_load, monkeypatch):
 def test_bad_input_is_refused(small_load, kwargs, error, message):
     with pytest.raises(error, match=message):
         view(**({"load": small_load} | kwargs))
+
+
+def test_numbers_take_few_bytes_as_long_as_they_fit():
+    for most, kind in ((2**15 - 1, np.int16), (2**15, np.int32)):
+        numbers = _short(np.array([0, most]))
+        assert numbers.dtype == kind and numbers.tolist() == [0, most]

@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from unload import Load, plain, stack_load
+from unload import Load, plain, stack_load, task
 from unload.env import observation
 
 CONTAINER, HIGHEST = "unload/Container-v0", "unload/HighestItem-v0"
@@ -48,3 +48,48 @@ def assert_same(one, other) -> None:
         assert one.tobytes() == other.tobytes()
     else:
         assert one == other
+
+
+def play_both(
+    env_id: str, num_envs: int, steps: int, seed: int = 0, options: dict | None = None, **kwargs
+) -> np.ndarray:
+    """Step both environments with the same actions, some random and some sensible.
+
+    Returns:
+        (steps, 2, num_envs) bool, where episodes were terminated, and where truncated.
+    """
+    array, side_by_side = make_pair(env_id, num_envs, **kwargs)
+    assert array.metadata["autoreset_mode"] is side_by_side.metadata["autoreset_mode"]
+    rng = np.random.default_rng(seed)
+    results = array.reset(seed=seed, options=options)
+    assert_same(results, side_by_side.reset(seed=seed, options=options))
+    ends = []
+    for _ in range(steps):
+        actions = rng.integers(128, size=num_envs)
+        sensible = rng.random(num_envs) < 0.4
+        actions[sensible] = results[0][sensible, :, 2].argmax(axis=1)
+        results = array.step(actions)
+        assert_same(results, side_by_side.step(actions))
+        ends.append(results[2:4])
+        over = np.logical_or(*ends[-1])
+        if array.metadata["autoreset_mode"] is AutoresetMode.DISABLED and over.any():
+            # The seed is for those that begin, and half of the time it is not given.
+            options = {"reset_mask": over}
+            given = {"seed": int(rng.integers(9))} if rng.random() < 0.5 else {}
+            begun = array.reset(**given, options=dict(options))
+            assert_same(begun, side_by_side.reset(**given, options=options))
+            results = begun
+    if env_id == CONTAINER:
+        visible = np.array([env.visible for env in side_by_side.envs])
+        lifts = [list(map(env.lift, env.visible.tolist())) for env in side_by_side.envs]
+        assert (array.unwrapped.visible == visible).all()
+        assert_same(array.liftable(), np.array(lifts) >= task.LIFT_THRESHOLD)
+        masks = [env.info()["action_mask"] for env in side_by_side.envs]
+        assert_same(array.action_masks(), np.array(masks).astype(bool))
+    assert_same(array.reset(), side_by_side.reset())
+    return np.array(ends)
+
+
+def mixed_stack(rng: np.random.Generator) -> Load:
+    """A load of 1 to 150 items."""
+    return few_items(rng, int(rng.choice([1, 2, 5, 40, 127, 128, 129, 150])))

@@ -9,6 +9,7 @@ from gymnasium.utils.env_checker import check_env
 
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, few_items, make_env
 from unload import ContainerEnv, plain
+from unload.env import observation
 from unload.env.highest_item import HighestItemVectorEnv
 from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import CONTACT_TOLERANCE
@@ -32,9 +33,12 @@ def test_a_physics_of_ones_own_stands_in_the_spec():
 @pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
 def test_a_single_environment_is_the_plain_one(env_id, rng):
     container = env_id == CONTAINER
-    own = {"stack": lambda rng: few_items(rng, 140)} if container else {}
-    env = make_env(env_id, max_picks=150, **own).unwrapped
-    page = (plain.Container if container else plain.HighestItem)(max_picks=150, **own)
+    # One is emptied, the other one goes on until it is cut off.
+    own = {"max_picks": 50}
+    if container:
+        own = {"max_picks": 999, "stack": lambda rng: few_items(rng, 140)}
+    env = make_env(env_id, **own).unwrapped
+    page = (plain.Container if container else plain.HighestItem)(**own)
     result = env.reset(seed=3)
     assert_same(result, page.reset(seed=3))
     ended = False
@@ -49,6 +53,7 @@ def test_a_single_environment_is_the_plain_one(env_id, rng):
             assert_same(env.observed_positions(), page.positions)
             assert_same(env.present, page.present)
         ended = result[2] or result[3]
+    assert result[2] == container
     with pytest.raises(ResetNeeded, match="the episode is finished; call reset first"):
         env.step(0)
     assert_same(env.reset(), page.reset())
@@ -59,6 +64,9 @@ def test_positions_are_blurred_and_sunk(full_load):
     env = make_env().unwrapped
     env.reset(seed=0, options={"load": full_load})
     blur = env.observed_positions() - full_load.positions
+    env.observed_positions()[:] = 0  # a copy
+    assert np.array_equal(env.observed_positions(), full_load.positions + blur)
+    assert not observation.drift(3, 0.0, env.np_random).any(), "without noise nothing sinks"
     assert blur.std(axis=0) == pytest.approx(0.0005, rel=0.1)
     assert blur.mean(axis=0) == pytest.approx([0, 0, -0.001], abs=1e-4)
 
@@ -99,6 +107,19 @@ def test_a_copy_goes_on_alone_with_the_same_bits(kind, env_id, rng):
     assert_same(play(second), played)
     if env_id == CONTAINER:
         assert first.physics is env.physics, "the table is shared"
+
+
+@pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
+def test_an_environment_goes_on_from_what_another_one_keeps(env_id, rng):
+    one, other = (gymnasium.make_vec(env_id, 2, max_picks=5).unwrapped for _ in range(2))
+    actions = rng.integers(128, size=(8, 2))
+    for seed, env in enumerate((one, other)):
+        env.reset(seed=seed)
+    for action in actions[:2]:
+        one.step(action)
+    other.load_state_dict(deepcopy(one.state_dict()))
+    for action in actions[2:]:
+        assert_same(one.step(action), other.step(action))
 
 
 @pytest.mark.pybullet

@@ -5,7 +5,7 @@ import pytest
 
 from unload import equalize, task
 from unload.env import observation
-from unload.fast.ranking import TIE_TOLERANCE, features
+from unload.fast.ranking import TIE_TOLERANCE
 
 
 def test_table_one():
@@ -103,14 +103,3 @@ def test_rows_that_hold_an_item(rng):
     expected[0, 1, 4:] = False
     held = observation.holds_item(seen)
     assert held.dtype == bool and (held == expected).all()
-
-
-def test_values_as_far_apart_as_the_tolerance_are_a_tie():
-    """Compiled or not: a little closer on each axis, exactly as far apart, and a little farther."""
-    tolerance = np.float32(TIE_TOLERANCE)
-    bounds = [np.nextafter(tolerance, np.float32(towards)) for towards in (0, 1)]
-    values = np.array([[0, step] for step in (bounds[0], tolerance, bounds[1])], np.float32)
-    ranks, observation = np.tile(np.arange(2, dtype=np.int32), (3, 1)), np.empty((2, 3), np.float32)
-    features(values, ranks, True, True, observation, 2)
-    assert observation.tolist() == [[0, 0, -1], [0, 0, 1]]
-    assert observation.tobytes() == equalize(values.T, "average").tobytes()

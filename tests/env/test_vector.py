@@ -9,52 +9,19 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 
 import unload
-from tests.env.comparing import CONTAINER, HIGHEST, assert_same, few_items, make_pair
+from tests.env.comparing import (
+    CONTAINER,
+    HIGHEST,
+    assert_same,
+    few_items,
+    mixed_stack,
+    play_both,
+)
 from tests.load.walls import crossed_bars, own_load
 from unload import plain
 from unload.env.vector import ContainerVectorEnv
 from unload.physics.local import LocalPhysics
-from unload.physics.table import LiftTable, TablePhysics
-
-
-def play_both(
-    env_id: str, num_envs: int, steps: int, seed: int = 0, options: dict | None = None, **kwargs
-) -> np.ndarray:
-    """Step both environments with the same actions, some random and some sensible.
-
-    Returns:
-        (steps, 2, num_envs) bool, where episodes were terminated, and where truncated.
-    """
-    array, side_by_side = make_pair(env_id, num_envs, **kwargs)
-    assert array.metadata["autoreset_mode"] is side_by_side.metadata["autoreset_mode"]
-    rng = np.random.default_rng(seed)
-    results = array.reset(seed=seed, options=options)
-    assert_same(results, side_by_side.reset(seed=seed, options=options))
-    ends = []
-    for _ in range(steps):
-        actions = rng.integers(128, size=num_envs)
-        sensible = rng.random(num_envs) < 0.4
-        actions[sensible] = results[0][sensible, :, 2].argmax(axis=1)
-        results = array.step(actions)
-        assert_same(results, side_by_side.step(actions))
-        ends.append(results[2:4])
-        over = np.logical_or(*ends[-1])
-        if array.metadata["autoreset_mode"] is AutoresetMode.DISABLED and over.any():
-            # The seed is for those that begin, and half of the time it is not given.
-            options = {"reset_mask": over}
-            given = {"seed": int(rng.integers(9))} if rng.random() < 0.5 else {}
-            begun = array.reset(**given, options=dict(options))
-            assert_same(begun, side_by_side.reset(**given, options=options))
-            results = begun
-    if env_id == CONTAINER:
-        visible = np.array([env.visible for env in side_by_side.envs])
-        lifts = [list(map(env.lift, env.visible.tolist())) for env in side_by_side.envs]
-        assert (array.unwrapped.visible == visible).all()
-        assert_same(array.liftable(), np.array(lifts) >= unload.task.LIFT_THRESHOLD)
-        masks = [env.info()["action_mask"] for env in side_by_side.envs]
-        assert_same(array.action_masks(), np.array(masks).astype(bool))
-    assert_same(array.reset(), side_by_side.reset())
-    return np.array(ends)
+from unload.physics.table import TablePhysics
 
 
 def test_full_containers_for_whole_episodes_and_beyond():
@@ -127,43 +94,14 @@ def test_random_actions_seeds_and_options(seed):
     play_both(**{name: values[rng.integers(len(values))] for name, values in settings.items()})
 
 
-def mixed_stack(rng: np.random.Generator) -> unload.Load:
-    """A load of 1 to 150 items."""
-    return few_items(rng, int(rng.choice([1, 2, 5, 40, 127, 128, 129, 150])))
-
-
-@pytest.mark.parametrize(
-    "kwargs",
-    [
-        {},
-        {"equalize": True},
-        {"equalize": True, "ties": "average"},
-        {"autoreset_mode": AutoresetMode.NEXT_STEP},
-        {"autoreset_mode": AutoresetMode.DISABLED},
-    ],
-    ids=str,
-)
-def test_episodes_that_end_at_different_steps(kwargs):
-    ends = play_both(CONTAINER, 5, 400, seed=2, max_picks=150, stack=mixed_stack, **kwargs)
+@pytest.mark.parametrize("mode", AutoresetMode)
+def test_episodes_that_end_at_different_steps(mode):
+    own = {"autoreset_mode": mode, "stack": mixed_stack}
+    ends = play_both(CONTAINER, 5, 400, seed=2, max_picks=150, **own)
     terminated, truncated = ends.transpose(1, 0, 2)
     assert terminated.any() and truncated.any()
     together = (terminated | truncated).sum(axis=1)
     assert {0, 1} < set(together.tolist())
-
-
-@pytest.mark.parametrize("physics", [None, TablePhysics(LiftTable())])
-def test_known_lifts_are_looked_up_by_the_compiled_loop(physics, monkeypatch):
-    """Which changes no bit if it is missing, but a run takes twice as long."""
-    envs = ContainerVectorEnv(4, *(() if physics is None else (physics,)))
-    actions = np.random.default_rng(0).integers(128, size=(100, 4))
-
-    def play() -> list:
-        return [envs.reset(seed=0), *map(envs.step, actions)]
-
-    first = play()
-    asked = Mock(side_effect=AssertionError("the table knows it"))
-    monkeypatch.setattr(TablePhysics, "simulate", asked)
-    assert_same(play(), first)
 
 
 def test_places_alone_say_what_is_free(monkeypatch):

@@ -114,6 +114,27 @@ def test_choice_is_that_of_the_network(batch, rng):
     best = values.detach().numpy()
     assert np.allclose(best[rows, actions], best[rows, expected], atol=1e-6)
     assert allowed[rows, actions].all()
+    equal, mask = batch["observations"][:, [0, 0, 0]], np.tile([False, True, True], (BATCH, 1))
+    assert (fused.best_actions(fused.weights_of(net), equal, mask) == 1).all(), "the first one"
+
+
+@pytest.mark.parametrize("place", ["extractor.weight", "scorer.bias", "observations"])
+def test_numbers_that_are_not_finite_are_an_error(batch, place):
+    """Also where a ReLU is closed, and where the loss does not show them."""
+    net = peq(4)
+    with torch.no_grad():
+        if place == "observations":
+            net.extractor.weight[:] = -net.extractor.weight.abs()
+            batch[place][0, 1 - batch["actions"][0] % 2] = np.inf
+        else:
+            net.get_parameter(place)[0] = torch.nan if "weight" in place else torch.inf
+    with pytest.raises(FloatingPointError, match="are not all finite; expected finite obs"):
+        gradients(net, batch)
+    if "weight" in place:
+        with pytest.raises(FloatingPointError, match="no allowed action of a finite value"):
+            fused.best_actions(
+                fused.weights_of(net), batch["observations"], np.ones((BATCH, ITEMS), bool)
+            )
 
 
 @pytest.mark.parametrize(
@@ -158,6 +179,9 @@ def test_steps_are_those_of_pytorch(rng, learning_rate):
     reference = torch.optim.Adam(theirs.parameters(), learning_rate)
     ends = np.cumsum([weight.numel() for weight in theirs.parameters()])[:-1]
     for number in range(100):
+        if number == 50:  # it goes on from a checkpoint
+            state, learner = learner.state_dict(), FusedLearner(ours, 1.0, beta=1.0)
+            learner.load_state_dict(state)
         gradients = rng.normal(size=len(before)) * 10.0 ** -(number % 7)
         gradients[3:5] = 0, 1e-8  # which is Adam's epsilon
         learner.step(gradients)

@@ -17,6 +17,8 @@ from unload.load.boxes import (
     Load,
     _find_contacts,
     check_no_overhang,
+    check_supported,
+    slabs,
 )
 
 FIELDS = ("positions", "sizes", "packages", "walls")
@@ -28,10 +30,10 @@ def one_box(**changes) -> Load:
 
 
 def test_a_load_cannot_be_changed(full_load):
-    positions = np.array([[3.5, 1.25, 0.5]])
-    load = one_box(positions=positions)
-    positions[:] = 0
-    assert load.positions.tolist() == [[3.5, 1.25, 0.5]]
+    positions, stops = np.array([[3.5, 1.25, 0.5]]), np.array([3])
+    load = one_box(positions=positions, extras={"stop": stops})
+    positions[:], stops[:] = 0, 0
+    assert load.positions.tolist() == [[3.5, 1.25, 0.5]] and load.extras["stop"].tolist() == [3]
     for name in FIELDS:
         with pytest.raises(ValueError, match="read-only"):
             getattr(full_load, name)[0] = 0
@@ -50,6 +52,7 @@ def test_a_load_cannot_be_changed(full_load):
         ({"sizes": np.ones((2, 3))}, ValueError, r"sizes has shape \(2, 3\); expected \(1, 3\)"),
         ({"sizes": [[0.0009, 1, 1]]}, ValueError, r"box \[0\]: edges of .* >= 0.002 m"),
         ({"packages": [0.0]}, TypeError, "packages has dtype float64; expected integers"),
+        ({"walls": [-1]}, ValueError, "walls holds -1; expected numbers >= 0"),
         ({"walls": [[0]]}, ValueError, r"walls has shape \(1, 1\)"),
         ({"ids": ["a", "b"]}, ValueError, r"ids has shape \(2,\); expected \(1,\)"),
         ({"extras": {"stop": [3, 4]}}, ValueError, r"extras\['stop'\] has shape \(2,\)"),
@@ -119,6 +122,28 @@ def test_what_shares_less_than_the_tolerance_of_a_contact_hangs_over_nothing():
         load = of_corners(corners, [(1, 1, 1), (1, 1 + reach, 0.5), (1, 0.5, 0.8)])
         with pytest.raises(ValueError, match="1 hangs over 2") if refused else nullcontext():
             check_no_overhang(load)
+
+
+def test_what_a_box_rests_on_over_others_it_does_not_hang_over():
+    """It reaches beyond the box between them."""
+    corners = [(0, 0.1, 0), (0, 0.1, 1), (0, 0, 1.5)]
+    check_no_overhang(of_corners(corners, [(1, 1, 1), (1, 1, 0.5), (1, 1.2, 0.5)]))
+
+
+@pytest.mark.parametrize(("share", "floats"), [(0.5, False), (2.0, True)])
+def test_a_box_stands_on_the_floor_within_the_tolerance_of_a_contact(share, floats):
+    load = of_corners([(0, 0, share * CONTACT_TOLERANCE)], [(1, 1, 1)])
+    with pytest.raises(ValueError, match="floats in load") if floats else nullcontext():
+        check_supported(load)
+
+
+def test_two_boxes_with_the_same_id_are_refused():
+    with pytest.raises(ValueError, match=r"boxes \[0, 1\]: the same id"):
+        of_corners([(0, 0, 0), (1, 0, 0)], np.ones((2, 3)), ids=["a", "a"])
+
+
+def test_slabs_end_where_nothing_overlaps():
+    assert slabs(np.array([1.0, 0.0, 1.5]), np.array([2.0, 1.0, 2.0])).tolist() == [1, 0, 1]
 
 
 def test_the_container_is_the_papers_or_ones_own():

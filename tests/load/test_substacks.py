@@ -23,8 +23,9 @@ def wall_cells(load: Load) -> list[tuple[int, int, int]]:
 
 @pytest.mark.parametrize("variants", list(itertools.product(range(3), repeat=4)))
 def test_every_combination_tiles_a_row(variants):
-    covered = np.zeros((CELLS_HIGH, CELLS_WIDE), dtype=int)
-    for package, left, lower in wall_cells(build_load([[variants]])):
+    covered, load = np.zeros((CELLS_HIGH, CELLS_WIDE), dtype=int), build_load([[variants]])
+    assert (load.sizes[:, 0] == task.CONTAINER[0]).all(), "a wall alone fills the container"
+    for package, left, lower in wall_cells(load):
         width, height = PACKAGES[package]
         assert left + width <= CELLS_WIDE and lower + height <= CELLS_HIGH
         covered[lower : lower + height, left : left + width] += 1

@@ -135,13 +135,16 @@ def test_bad_numbers_of_features_are_refused(kind):
             kind(number)
 
 
-def test_a_network_is_in_single_precision_whatever_pytorchs_default_is():
+def test_a_network_is_in_single_precision_on_the_cpu_whatever_pytorchs_defaults_are():
     torch.set_default_dtype(torch.float64)
+    torch.set_default_device("meta")
     try:
-        assert make_network("peq", 4).extractor.weight.dtype == torch.float32
+        weight = make_network("peq", 4).extractor.weight
+        assert (weight.dtype, weight.device.type) == (torch.float32, "cpu")
         assert torch.get_default_dtype() == torch.float64
     finally:
         torch.set_default_dtype(torch.float32)
+        torch.set_default_device(None)
 
 
 @pytest.mark.parametrize(
@@ -166,14 +169,16 @@ def test_a_function_of_other_arguments_is_refused_by_name(network):
 
 
 def test_a_network_is_tried_in_a_copy():
-    """It may count its calls, and begins in the mode for training."""
+    """It may count its calls, and begins in the mode for training, in which the copy is not."""
+    asked = []
 
     class Counting(PEQNetwork):
         calls = 0
 
         def forward(self, observations, present=None):
             self.calls += 1
+            asked.append((self.training, present.dtype))
             return super().forward(observations, present)
 
     made = make_network(Counting, 4)
-    assert made.training and made.calls == 0
+    assert made.training and made.calls == 0 and asked == [(False, torch.bool)]

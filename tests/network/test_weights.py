@@ -8,7 +8,7 @@ from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
 from unload.network import weights
-from unload.network.weights import read_weights, write_weights
+from unload.network.weights import as_arrays, as_tensors, read_weights, write_weights
 
 SETTINGS = {"sizes": [3, 2], "ends": "open"}
 WEIGHTS = {"a.bias": torch.arange(3.0), "b.weight": torch.full((2, 2), 0.5)}
@@ -68,3 +68,13 @@ def test_a_file_of_another_dtype_is_refused(path, monkeypatch):
         write_weights(path, "pair", {}, halves)
     with pytest.raises(ValueError, match="holds no pair .* a.bias of dtype torch.float16"):
         read_weights(path, "pair", print)
+
+
+def test_tensors_are_arrays_of_the_same_memory_at_any_depth_and_back():
+    """Their names become text, as in a file."""
+    tensor = torch.zeros(2, requires_grad=True)
+    arrays = as_arrays({"state": {0: tensor}, "groups": [(tensor, "a")]})
+    arrays["state"]["0"][0] = 5
+    assert arrays["groups"][0][0].tolist() == tensor.tolist() == [5, 0]
+    again = as_tensors(arrays)
+    assert again["groups"][0][1] == "a" and torch.equal(again["state"]["0"], tensor)

@@ -49,6 +49,11 @@ def test_boxes_are_pushed_apart_to_the_side_and_back_from_the_wall():
     assert settle(along, sizes) == pytest.approx(np.array([(0, 0, 0), (0.5, 0.2, 0), (0.5, 1, 0)]))
 
 
+def test_boxes_that_share_as_much_of_depth_as_of_width_are_pushed_apart_along_depth():
+    found = settle([(0, 0, 0), (0.496, 0.496, 0)], np.full((2, 3), 0.5))
+    assert found == pytest.approx(np.array([(0, 0, 0), (0.5, 0.496, 0)]))
+
+
 def test_the_longest_row_through_a_box_says_how_much_it_shrinks():
     """The last box stands beside a long row and a short one, which ends later; so does the first.
 

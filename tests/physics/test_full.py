@@ -6,6 +6,7 @@ import pytest
 from tests.physics.test_local import ONE_BOX, lifts, make
 from unload import Load, task
 from unload.load.substacks import build_load
+from unload.physics.bullet import GAP, World
 from unload.physics.full import FullPhysics
 
 pytestmark = pytest.mark.pybullet
@@ -25,6 +26,19 @@ def test_what_a_full_lift_leaves_behind(boxes, after_pick, item, restored):
     assert (physics.lift(item) >= task.LIFT_THRESHOLD) == (item == 2)
     moved = np.abs(physics.positions() - load.positions).max()
     assert moved == 0 if restored else moved > 0.005
+
+
+def test_boxes_are_as_large_as_in_a_situation(monkeypatch):
+    """In whole micrometres, and less the gap between them."""
+    sizes, add_box = [], World.add_box
+
+    def noted(world, position, size, mass):
+        sizes.append(size)
+        return add_box(world, position, size, mass)
+
+    monkeypatch.setattr(World, "add_box", noted)
+    make("full", Load([[1, 1, 0.2]], [[0.4000004, 0.4, 0.4]]))
+    assert sizes[-1] == pytest.approx([0.4 - GAP, 0.4 - GAP, 0.4], abs=1e-9)
 
 
 @pytest.mark.parametrize("call", ["lift", "remove"])

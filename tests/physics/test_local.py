@@ -9,7 +9,6 @@ import pytest
 from tests.load.walls import of_corners
 from unload import ContainerEnv, Load, evaluate, policies
 from unload.env.vector import ContainerVectorEnv
-from unload.load.boxes import check_no_overhang
 from unload.load.substacks import build_load
 from unload.physics.bullet import World
 from unload.physics.full import FullPhysics
@@ -98,6 +97,9 @@ def test_a_world_that_is_cleared_gives_the_same(situations, monkeypatch):
         assert physics.simulate(situation) == distance
         assert physics._world.bodies <= len(situation.boxes) + 6
     assert fresh._world.bodies > 30
+    fresh._world.add_box((0, 0, 0), (1, 1, 1), 1.0)
+    fresh._world.clear()
+    assert fresh._world.client.getNumBodies() == fresh._world.bodies == 0
 
 
 class Half(LocalPhysics):
@@ -108,15 +110,13 @@ class Half(LocalPhysics):
 
 
 def test_a_load_with_an_overhang_is_refused_where_contacts_alone_are_followed():
-    """A plank on two posts over a low box, which it would be pulled through; and one on it."""
-    corners = [(0, 0, 0), (2.5, 0, 0), (1.5, 0, 0), (0, 0, 0.5), (1, 0, 0.7)]
-    sizes = [(0.5, 1, 0.5), (0.5, 1, 0.5), (0.5, 1, 0.4), (3, 1, 0.2), (0.5, 1, 0.2)]
-    load = of_corners(corners, sizes, ids=["left", "right", "low", "plank", "top"])
+    """A plank on two posts over a low box, which it would be pulled through."""
+    corners = [(0, 0, 0), (2.5, 0, 0), (1.5, 0, 0), (0, 0, 0.5)]
+    sizes = [(0.5, 1, 0.5), (0.5, 1, 0.5), (0.5, 1, 0.4), (3, 1, 0.2)]
+    load = of_corners(corners, sizes, ids=["left", "right", "low", "plank"])
     for env in (ContainerVectorEnv(1), ContainerEnv("local"), ContainerEnv("table")):
         with pytest.raises(ValueError, match="plank hangs over low; expected .*physics='full'"):
             env.reset(options={"load": load})
-    for kept in ([0, 1, 3, 4], [0, 1, 2]):  # without what is below, or above
-        check_no_overhang(of_corners(np.array(corners)[kept], np.array(sizes)[kept]))
 
 
 @pytest.mark.pybullet

@@ -42,6 +42,17 @@ def test_floor_and_side_walls_hold_what_they_touch():
         assert abs(mujoco.simulate(Situation(box, 1, floor, sides)) - free) > 0.002
 
 
+def test_a_free_box_loses_as_much_speed_in_a_second_as_in_bullet():
+    """Written out step by step; a share of the speed, which is lost within each step."""
+    box, speed, moved = np.array([[0, 0, 0, 400_000, 400_000, 400_000]], np.int32), 0.0, 0.0
+    for _ in range(round(task.LIFT_TIME / mujoco.STEP)):
+        speed += mujoco.STEP * (task.PICK_FORCE / task.MASS - task.GRAVITY)
+        speed /= 1 - mujoco.STEP * np.log(1 - bullet.DAMPING)
+        moved += mujoco.STEP * speed
+    assert mujoco.simulate(Situation(box, 1, None, ())) == pytest.approx(moved, abs=1e-6)
+    assert mujoco.settings()["time_step"] == mujoco.STEP and "pybullet" not in mujoco.settings()
+
+
 @pytest.mark.pybullet
 @pytest.mark.parametrize("beyond", [60_000, 160_000, 200_000])
 def test_friction_is_that_of_pybullet(beyond):

@@ -99,10 +99,6 @@ def free_box(number: int) -> Situation:
     return Situation(np.array([[0, 0, 0, 400_000, 400_000, number]], np.int32), 1, None, ())
 
 
-def entries_of(table: LiftTable) -> list[list[int]]:
-    return [array.tolist() for array in table.entries]
-
-
 def table_of(numbers: Iterable[int]) -> LiftTable:
     """A table of lifts, that of box k over k mm."""
     table = LiftTable()

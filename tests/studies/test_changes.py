@@ -9,8 +9,8 @@ import pytest
 from studies import changes
 from studies.falls.laboratory import CONFIG
 from studies.seamless.jamming import jam, weigh
-from tests.agent.runs import assert_same, at_step, interrupt
-from unload.agent.training import Training, train
+from unload import check_resume
+from unload.agent.training import Training
 
 SMALL = replace(CONFIG, picks=6400, replay_size=2**13, log_interval=10, seed=3)
 
@@ -22,7 +22,6 @@ def run_of(change, steps=3, config=SMALL):
     for _ in range(steps):
         seen.append(run.rollout.observations.copy())
         run.step()
-    run.rollout.close()
     return run, np.concatenate(seen)
 
 
@@ -33,8 +32,7 @@ def asking():
     run.agent.learner.best_actions = lambda observations, allowed: (
         asked.append(observations) or np.zeros(len(allowed), np.int64)
     )
-    yield run, asked
-    run.rollout.close()
+    return run, asked
 
 
 def remembered(run):
@@ -121,11 +119,7 @@ def test_choices_see_other_signs_than_the_memory_holds(asking, given, axes):
         (partial(jam, share=0.4, lasts=1), partial(changes.successes_only, start=1280)),
     ],
 )
-def test_a_changed_run_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, makes):
+def test_a_changed_run_that_was_stopped_goes_on_as_if_it_had_not(makes):
     """Otherwise the long runs would depend on where they were stopped."""
-    config, change = replace(SMALL, max_picks=25), partial(changes.several, makes=makes)
-    train(config, tmp_path / "whole", progress=False, change=change)
-    with at_step(60, interrupt), pytest.raises(KeyboardInterrupt):
-        train(config, tmp_path / "stopped", progress=False, change=change)
-    train(config, tmp_path / "stopped", progress=False, change=change, same_code=True)
-    assert_same(tmp_path / "whole", tmp_path / "stopped")
+    change = partial(changes.several, makes=makes)
+    check_resume(replace(SMALL, max_picks=25), change=change)

@@ -14,9 +14,6 @@ from tests.network.test_peq import (  # noqa: F401
     test_weights_are_drawn_from_plus_minus_one_over_root_inputs,
     test_what_absent_rows_hold_has_no_influence,
 )
-from unload import Greedy
-from unload.agent.learner import best_actions
-from unload.task import PADDING
 
 
 @pytest.fixture(params=NETWORKS.values())
@@ -28,17 +25,6 @@ def kind(request) -> type:
 def items(rng):
     """``items(batch, count)``: random observations."""
     return lambda *shape: torch.from_numpy(rng.uniform(-1, 1, (*shape, 3)).astype(np.float32))
-
-
-def test_rows_without_an_item_have_no_part_in_the_choice(kind, rng):
-    network, observations = make(kind, seed=2), rng.uniform(-1, 1, (40, 25, 3)).astype(np.float32)
-    masks = np.ones((len(observations), 25))
-    full = Greedy(network, equalize=False)(observations, masks, rng)
-    few = network(torch.from_numpy(observations[:, :4])).argmax(dim=1).numpy()
-    observations[:, 4:], masks[:, 4:] = PADDING, 0
-    assert (Greedy(network, equalize=False)(observations, masks, rng) == few).all()
-    with_padding = best_actions(network, observations, masks.astype(bool))
-    assert (with_padding != few).any() and (full != few).any()
 
 
 def test_the_two_layer_scorer_is_the_papers_network_with_a_hidden_layer(items):

@@ -12,21 +12,38 @@ from joblib import Parallel, delayed
 from torch import nn
 
 from studies import paths, results, sweep
+from studies.falls import cells
 from studies.falls.long import LONG
 from studies.grid import published_runs, read_grid
 from studies.heap import greed, rake
 from studies.lifts.lift_table import mixed
+from studies.mask import laboratory as mask
+from studies.order import laboratory as order
 from studies.paper.training import PAPER
 from studies.paper.tuning import TUNING
 from studies.policies.variants import GRIDS
 from studies.results import kept, measured, publish, read_provenance, read_table, revision
 from studies.seamless.training import SEAMLESS
+from studies.ties import choice
+from studies.ties import laboratory as ties
 from studies.ties.training import TIES
 from unload.physics.bullet import engine_of
 from unload.support import files
 
 PUBLISHED = {grid.name: grid for grid in (PAPER, TUNING, LONG, SEAMLESS, *GRIDS.values())}
 RECORDED = PUBLISHED | {TIES.name: TIES}  # not all of its runs were made
+# The cells whose runs have a row each in a table.
+LABORATORIES = {
+    "falls/laboratory": cells.CELLS,
+    "falls/fresh": cells.FRESH,
+    "mask/laboratory": mask.CELLS,
+    "order/laboratory": order.CELLS,
+    "order/tuning": order.TUNED,
+    "ties/laboratory": ties.CELLS,
+    "ties/choice_laboratory": choice.CHOICE_CELLS,
+    "ties/mask_laboratory": choice.MASK_CELLS,
+}
+UNFINISHED = ("mask/", "order/")  # of which only the first runs were made so far
 
 
 @pytest.fixture
@@ -46,12 +63,6 @@ def test_a_result_is_computed_once_per_question(tmp_path, asked):
     assert first.record["revision"] == revision() and 0 <= first.record["wall_time_s"] < 60
     same = kept(tmp_path, {"sizes": (2, 3), "seed": 1}, partial(asked, "not computed"))
     assert str(same) == str(first) and asked.call_count == 1
-
-
-def test_an_answer_to_another_question_is_not_taken(tmp_path, asked):
-    for seed in (1, 2, 1):
-        assert kept(tmp_path, {"seed": seed}, partial(asked, seed)).value == seed
-    assert asked.call_count == 2  # neither replaces the other
 
 
 def test_an_answer_that_cannot_be_kept_is_refused(tmp_path):
@@ -169,6 +180,7 @@ def test_records_are_joined():
     together = results.joined([first, second])
     assert (together["runs"], together["wall_time_s"]) == (2, 30.5)
     assert together["revision"] == [first["revision"], "another"]
+    assert results.joined([together, first])["runs"] == 3
 
 
 def test_the_projects_own_commit_is_its_revision(tmp_path, monkeypatch):
@@ -219,6 +231,18 @@ def test_all_planned_runs_are_published_in_full_length(name):
     if grid.measure is None:
         last = rows.groupby(["cell", "seed"])["picks"].max()
         assert {config.picks for config in planned.values()} == {*last}
+
+
+@pytest.mark.parametrize("name", LABORATORIES)
+def test_a_laboratory_has_the_runs_of_its_cells(name):
+    rows, planned = read_table(name), LABORATORIES[name]
+    for cell, seeds in rows.groupby("cell")["seed"]:
+        assert sorted(seeds) == list(planned[cell].seeds)[: len(seeds)], cell
+    assert published_runs(read_provenance(name)) == len(rows)
+    if not name.startswith(UNFINISHED):
+        assert rows["cell"].value_counts().to_dict() == {
+            cell: len(each.seeds) for cell, each in planned.items()
+        }
 
 
 def test_the_code_of_a_function_is_that_of_all_that_its_module_imports(tmp_path, set_in):

@@ -98,3 +98,16 @@ def test_arrays_are_returned_in_one_dtype(check, value, arguments, dtype):
 def test_arrays_and_entries_that_do_not_fit_are_refused(check, value, arguments, error, message):
     with pytest.raises(error, match=message):
         check("a", value, *arguments)
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (ImportError("-", name="torch"), r'^it needs torch, .* pip install "\.\[train\]"$'),
+        (ImportError("Missing optional dependency 'openpyxl'"), r"^it needs openpyxl, .*\[excel\]"),
+        (ImportError("no such library", name="nosuch"), "^no such library$"),
+    ],
+)
+def test_a_library_that_is_missing_is_named_with_the_extra_that_brings_it(error, message):
+    with pytest.raises(ImportError, match=message), checks.needed_for("it"):
+        raise error

@@ -11,6 +11,7 @@ import numpy as np
 
 import unload
 from unload.support import compiled
+from unload.support.compiled import Compiled
 
 PACKAGE = Path(unload.__file__).parent
 # A module whose compiled function reads a constant of another one.
@@ -45,6 +46,23 @@ def test_code_is_compiled_once_for_each_value_of_a_constant(tmp_path, run_python
     assert printed == "0.6 0\n" and "compiling" in said
     (package / "task.py").write_text(constants, encoding="utf-8")
     assert run() == ("0.3 1\n", "")
+    own = given | {"NUMBA_CACHE_DIR": str(tmp_path / "own")}
+    _, said = run_python("import unload.load.made", tmp_path, **own)
+    assert str(tmp_path / "own/compiled-") in said
+
+
+def tripled(number):
+    return number * np.uint64(3)
+
+
+def test_a_plain_function_is_compiled_as_soon_as_numba_is_there(monkeypatch):
+    """Until then integers wrap as they do in compiled code; numba's settings stay the user's."""
+    function, number, before = Compiled(tripled, True, {}), np.uint64(2**63), numba.config.CACHE_DIR
+    with monkeypatch.context() as patch:
+        patch.delitem(sys.modules, "numba")
+        assert function(number) == 2**63 and "dispatcher" not in vars(function)
+    assert function(number) == 2**63 and "dispatcher" in vars(function)
+    assert numba.config.CACHE_DIR == before
 
 
 def test_each_version_of_python_and_its_libraries_has_code_of_its_own(monkeypatch):

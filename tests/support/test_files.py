@@ -26,7 +26,7 @@ def test_what_is_no_file_of_plain_arrays_is_neither_read_nor_written(tmp_path):
     whole, single, pickled = path.read_bytes(), BytesIO(), BytesIO()
     with pytest.raises(ValueError):
         files.write_arrays(path, objects)
-    assert path.read_bytes() == whole
+    assert path.read_bytes() == whole and [*tmp_path.iterdir()] == [path], "nothing is left over"
     np.save(single, np.arange(3))  # which NumPy reads, too
     np.savez(pickled, **objects)
     times = whole.replace(b"<i8", b"<m8")  # which have no bytes to compare
@@ -61,6 +61,8 @@ def test_arrays_come_back_as_they_were_or_are_refused_by_name(tmp_path, rng):
     assert contents(files.read_arrays(path)) == contents(ARRAYS)
     with pytest.raises(ValueError, match="arrays.npz was changed or damaged: .*, expected None"):
         files.read_arrays(path, checked=True)
+    turned = dict([*ARRAYS.items()][::-1])
+    assert np.array_equal(files._digest_of_arrays(turned), files._digest_of_arrays(ARRAYS))
 
 
 def test_nested_values_come_back_as_they_were(tmp_path):

@@ -11,7 +11,7 @@ import torch
 from studies import paths
 from studies.falls import cells, laboratory, long, measures
 from studies.falls.laboratory import CONFIG
-from studies.grid import published_runs, read_policies
+from studies.grid import read_policies
 from studies.paper.training import PAPER
 from studies.policies.margin import own_scores
 from studies.results import read_provenance, read_table
@@ -63,15 +63,9 @@ def test_cells_are_trained_measured_and_written(own_data, monkeypatch, set_in):
     assert fresh["judged_averaged_x"].tolist() == pytest.approx([averaged], 1e-3)
 
 
-@pytest.mark.parametrize(
-    ("name", "planned"), [("falls/laboratory", cells.CELLS), ("falls/fresh", cells.FRESH)]
-)
-def test_the_published_runs_are_those_of_the_cells_and_of_the_configuration(name, planned):
-    seeds = {cell: sorted(group["seed"]) for cell, group in read_table(name).groupby("cell")}
-    assert seeds == {name: list(cell.seeds) for name, cell in planned.items()}
-    record = read_provenance(name)
-    assert CONFIG.plain().items() <= record["settings"]["config"].items()
-    assert published_runs(record) == sum(map(len, seeds.values()))
+@pytest.mark.parametrize("name", ["falls/laboratory", "falls/fresh"])
+def test_the_published_runs_are_of_the_configuration(name):
+    assert CONFIG.plain().items() <= read_provenance(name)["settings"]["config"].items()
 
 
 def test_the_published_traces_are_of_the_whole_runs_that_are_traced():
@@ -102,7 +96,6 @@ def test_a_slope_is_kept_from_sinking(cell, scaled):
             if step == 19:  # it sinks; one look follows, after step 30
                 with torch.no_grad():
                     run.agent.network.extractor.weight[:, 2] *= 0.2
-        run.rollout.close()
         weights[name] = run.agent.network.extractor.weight.detach().abs().sum(dim=0)
     # What is learned in eleven steps in between differs a little, too.
     ratio = (weights["held"] / weights["plain"]).numpy()

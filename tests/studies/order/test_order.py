@@ -4,13 +4,19 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from studies import paths
 from studies.grid import read_policies, read_provenance
 from studies.order import laboratory, training
-from studies.order.index import BY_ROWS, ROWS, index_by_rows, see_index, sorted_index
+from studies.order.index import (
+    BY_ROWS,
+    ROWS,
+    _order_of_rows,
+    index_by_rows,
+    see_index,
+    sorted_index,
+)
 from studies.results import read_table
 from studies.ties.choice import WAYS, evaluate_choice
 from unload import task
@@ -62,20 +68,27 @@ def test_a_run_chooses_by_what_it_remembers(rows):
     BY_ROWS[rows](run)
     shown = run.rollout.observations.copy()
     run.step()
-    run.rollout.close()
     stored = run.replay.arrays["observations"][: task.NUM_ENVS]
     assert np.array_equal(stored, asked[0])
     assert np.array_equal(np.sort(stored, axis=1), np.sort(shown, axis=1))
     assert np.array_equal(stored, sorted_index(shown)) == (rows == "distance")
 
 
-def test_stacked_rows_stand_wall_by_wall():
-    run = Training(SMALL, change=BY_ROWS["wall"])
+@pytest.mark.parametrize("rows", ["wall", "height"])
+def test_rows_stand_wall_by_wall_or_the_highest_first(rows):
+    run = Training(SMALL, change=BY_ROWS[rows])
     shown, visible = run.rollout.observations.copy(), run.rollout.envs.unwrapped.visible
     run.step()
-    run.rollout.close()
-    expected = index_by_rows(shown, np.argsort(visible, axis=1))
+    order = visible if rows == "wall" else -shown[..., 2]
+    expected = index_by_rows(shown, np.argsort(order, axis=1, kind="stable"))
     assert np.array_equal(run.replay.arrays["observations"][: task.NUM_ENVS], expected)
+
+
+def test_random_rows_are_others_at_each_step_and_the_same_for_all_who_ask():
+    run, found = Training(SMALL), []
+    for run.rollout.steps in (5, 6, 5):
+        found.append(_order_of_rows(run, run.rollout.observations, "random"))
+    assert (found[0] != found[1]).any(axis=1).all() and np.array_equal(found[0], found[2])
 
 
 def test_an_update_in_four_steps():
@@ -87,7 +100,6 @@ def test_an_update_in_four_steps():
             before = run.curve.sums["updates"]
             run.step()
             updates += run.curve.sums["updates"] != before
-        run.rollout.close()
         counts.append(updates)
     assert counts == [20, 5]
 
@@ -99,7 +111,6 @@ def test_what_touches_a_picked_box_is_displaced_for_good(see):
     for _ in range(30):
         for each in (run, plain):
             each.step()
-    run.rollout.close(), plain.rollout.close()
     moved, usual = (each.replay.arrays["observations"] for each in (run, plain))
     assert np.array_equal(moved[:64], usual[:64])  # nothing has been picked yet
     assert (moved[64:128] != usual[64:128]).any()
@@ -152,10 +163,3 @@ def test_a_published_network_chooses_as_it_is_said_to():
     seen = evaluate_choice(policies[name], "frozen", True, see=equalize, **ranks)
     assert usual.pop("preference") < seen.pop("preference")  # it is asked of averaged ties
     assert usual == seen
-
-
-def test_the_laboratory_has_the_first_of_its_planned_seeds():
-    rows = pd.concat([read_table(f"order/{name}") for name in ("laboratory", "tuning")])
-    planned = laboratory.CELLS | laboratory.TUNED
-    for name, seeds in rows.groupby("cell")["seed"]:
-        assert seeds.tolist() == list(planned[name].seeds)[: len(seeds)], name

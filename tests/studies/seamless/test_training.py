@@ -33,7 +33,6 @@ def test_the_jams_of_the_next_episode_are_others():
         rows = (np.full(run.config.num_envs, row) for row in range(task.N_VISIBLE))
         found.append(np.stack([run.rollout.envs.unwrapped._lift(row)[1] for row in rows]))
         run.rollout.steps += run.config.max_picks
-    run.rollout.close()
     free = np.maximum(*found) >= task.LIFT_THRESHOLD
     assert (found[0] != found[1])[free].mean() == pytest.approx(2 / 3, abs=0.1)
 
@@ -42,7 +41,6 @@ def test_neighbours_are_those_that_touch_a_box():
     run = Training(replace(CONFIG, seed=3, epsilon_final=1.0, mask=False))
     for _ in range(40):
         run.step()
-    run.rollout.close()
     state, seen = run.rollout.envs.unwrapped._containers, set()
     for row in range(0, 128, 9):
         items = state.visible[:, row].astype(np.int64)
@@ -79,7 +77,6 @@ def test_the_first_episode_of_a_published_run_is_trained_again(name):
     run = Training(replace(cell.config, seed=FIRST_SEED), change=cell.change)
     for _ in range(500):
         run.step()
-    run.rollout.close()
     published = read_grid(training.SEAMLESS, cells=[name]).iloc[0]
     found = run.curve.table().iloc[0]
     assert published["seed"] == FIRST_SEED

@@ -13,8 +13,7 @@ from studies.grid import cell_of
 from studies.results import read_table
 from studies.ties import choice
 from studies.ties.noise import DriftingTies, drifting, renewed
-from tests.agent.runs import assert_same, at_step, interrupt
-from unload import train
+from unload import check_resume
 from unload.agent.training import Training
 
 SMALL = replace(CONFIG, picks=64 * 40, batch_size=64, seed=3)
@@ -67,7 +66,6 @@ def test_the_choice_and_the_memory_have_noise_of_their_own(at_choice, stored):
     run.agent.learner.best_actions = note
     for _ in range(4):
         run.step()
-    run.rollout.close()
     learned = run.replay.arrays["observations"][: 4 * 64].reshape(4, 64, 128, 3)
     assert (learned == chosen).all() == (at_choice == stored)
     # Where nothing was unloaded, frozen noise shows the same again, and noise anew something else.
@@ -83,7 +81,6 @@ def test_no_deadlocked_pick_is_stored():
     for training in (run, usual):
         for _ in range(30):
             training.step()
-        training.rollout.close()
     assert usual.curve.sums["deadlocked"] > 300 and run.curve.sums["deadlocked"] > 300
     assert len(run.replay) == len(usual.replay) == 30 * 64
     # What one container shows changes with a success alone, so that of the same observation and
@@ -110,7 +107,6 @@ def test_a_container_is_filled_anew_at_a_deadlock():
         assert run.rollout.masks[deadlocked].all() and (envs._picks == step + 1).all()
         assert (run.rollout.observations == envs._copy_observations()).all()
     assert deadlocks > 100
-    run.rollout.close()
 
 
 def test_published_choices_are_of_all_networks_and_ways(networks):
@@ -135,25 +131,12 @@ def test_published_choices_are_those_of_the_networks(networks, name):
         assert counts == pytest.approx(row.to_dict(), rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("name", "cells"),
-    [("choice_laboratory", choice.CHOICE_CELLS), ("mask_laboratory", choice.MASK_CELLS)],
-)
-def test_published_laboratory_runs_are_those_of_the_plan(name, cells):
-    seeds = {
-        cell: sorted(rows["seed"]) for cell, rows in read_table(f"ties/{name}").groupby("cell")
-    }
-    assert seeds == {cell: list(plan.seeds) for cell, plan in cells.items()}
-
-
 UNBLURRED = replace(CONFIG, picks=64 * 60, seed=3, position_noise=0.0)
 
 
 @pytest.fixture
 def run():
-    made = Training(UNBLURRED)
-    yield made
-    made.rollout.close()
+    return Training(UNBLURRED)
 
 
 def orders(run: Training, correlation: float, picks: int) -> np.ndarray:
@@ -196,7 +179,6 @@ def test_what_is_chosen_by_is_what_is_learned_from():
     stored = run.replay.arrays["observations"][:64], run.replay.arrays["actions"][:64]
     best = run.agent.learner.best_actions(stored[0], np.ones((64, 128), bool))
     assert (stored[1] == best).all() and (stored[0] != before).any(axis=(1, 2)).all()
-    run.rollout.close()
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
@@ -213,16 +195,11 @@ def test_noise_is_renewed_by_a_success_alone(correlation):
         assert ((run.kept["ties"] == offsets).all(axis=(1, 2)) == failed).all()
         assert ((now == before).all(axis=(1, 2)) == failed).all()
         assert failed.any() == (step not in (0, 20)) and not failed.all()
-    run.rollout.close()
 
 
 @pytest.mark.parametrize("change", [partial(drifting, correlation=(0.9, 0.9, 0.99)), renewed])
-def test_a_resumed_run_has_the_same_bits(tmp_path, change):
-    train(UNBLURRED, tmp_path / "whole", progress=False, change=change)
-    with at_step(41, interrupt), pytest.raises(KeyboardInterrupt):
-        train(UNBLURRED, tmp_path / "parts", progress=False, change=change)
-    train(UNBLURRED, tmp_path / "parts", progress=False, change=change, same_code=True)
-    assert_same(tmp_path / "whole", tmp_path / "parts")
+def test_a_resumed_run_has_the_same_bits(change):
+    check_resume(UNBLURRED, change=change)
 
 
 @pytest.mark.parametrize("fields", [{"position_noise": 0.0005}, {"equalize": False}])
