@@ -1,4 +1,4 @@
-"""The paper's numbers, each once and with its source; and the version of unload.
+"""The paper's numbers, each once and with its source; names of the tasks, and unload's version.
 
 Lengths in metres, forces in newtons, times in seconds. The container's axes are
 x (depth, 0 at the rear wall and 7 at the entrance), y (width) and z (height).
@@ -7,6 +7,9 @@ x (depth, 0 at the rear wall and 7 at the entrance), y (width) and z (height).
 import numpy as np
 
 VERSION = "0.3.0"  # of unload, as in pyproject.toml
+
+# Under which Gymnasium knows the container (Sec. III) and the tuning environment (Sec. IV-A).
+CONTAINER_ENV, HIGHEST_ITEM_ENV = "unload/Container-v0", "unload/HighestItem-v0"
 
 # Sec. III-A, scaling of the observation: inner size of the container.
 CONTAINER = np.array([7.0, 2.5, 2.5])

@@ -12,8 +12,7 @@ import pytest
 
 from tests.agent.runs import CONTAINER, assert_same, few_walls, interrupt_run, kill_run, metres
 from unload import TrainConfig, stack_load, train
-from unload.agent.config import settings_of_run
-from unload.checkpoint.settings import package
+from unload.checkpoint.settings import package, settings_of_run
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import files
 
@@ -37,7 +36,7 @@ def test_a_run_is_not_gone_on_with_by_another_engine(tmp_path, monkeypatch):
     config = TrainConfig(**CONTAINER)
     interrupt_run(config, tmp_path, 3)
     (other,) = {*ENGINES} - {engine_of()}
-    monkeypatch.setattr("unload.agent.config.engine_of", lambda: other)
+    monkeypatch.setattr("unload.checkpoint.settings.engine_of", lambda: other)
     with pytest.raises(ValueError, match=r"engine \(.* not .*\)"):
         train(config, tmp_path, progress=False)
     heights = replace(config, env="unload/HighestItem-v0")
