@@ -5,7 +5,8 @@ import pytest
 
 from unload import equalize, task
 from unload.env import observation
-from unload.fast.ranking import TIE_TOLERANCE, features
+from unload.fast.ranking import features
+from unload.task import TIE_TOLERANCE
 
 
 def test_table_one():
