@@ -65,7 +65,7 @@ def equalize(
 
 
 def _shared_ranks(ordered: np.ndarray) -> np.ndarray:
-    """The mean rank of each run of values at most ``task.TIE_TOLERANCE`` apart, sorted on axis -2."""
+    """The mean rank of each run of tied values, see ``task``, which are sorted on axis -2."""
     items = ordered.shape[-2]
     index = np.broadcast_to(np.arange(items)[:, None], ordered.shape)
     opens = np.ones(ordered.shape, dtype=bool)

@@ -145,9 +145,9 @@ def read_load(
         refuse(np.array(error.boxes), problem, argument if error.misplaced else None)
     if (tipping := uncarried(load)).size:
         refuse(tipping, "tips, because nothing carries its centre of mass", "tolerance")
-    for lengths, what in ((moves, "moved by"), (smaller, "taken for smaller, by")):
-        if lengths.any():
-            count, most = lengths.any(axis=1).sum(), 1000 * np.linalg.norm(lengths, axis=1).max()
+    for edits, what in ((moves, "moved by"), (smaller, "taken for smaller, by")):
+        if edits.any():
+            count, most = edits.any(axis=1).sum(), 1000 * np.linalg.norm(edits, axis=1).max()
             LOGGER.warning("%d of %d boxes %s up to %.1f mm", count, len(load), what, most)
     if moves.any() or smaller.any():
         # Each edge of two boxes may be elsewhere, by its fault and by what mended it.
