@@ -1,7 +1,7 @@
 """The configuration of a training run (Sec. IV-B)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 
 import gymnasium
@@ -143,7 +143,7 @@ class TrainConfig:
 
     def plain(self) -> dict:
         """Return the fields as JSON can hold them, a function by its qualified name."""
-        return plain({field.name: getattr(self, field.name) for field in fields(self)})
+        return plain(vars(self))
 
     def epsilon(self, picks: int) -> float:
         """Exploration rate after ``picks`` picks: linear from init to final, then constant."""

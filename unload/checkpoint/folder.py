@@ -48,7 +48,6 @@ class RunFolder:
             wanted = "expected a folder of the run's own, with a name in UTF-8"
             raise ValueError(f"run_dir is {str(run_dir)!r}; {wanted}")
         self.path, self._same_code = path.absolute(), checks.boolean("same_code", same_code)
-        self._settings = settings_of_run(config, stack, change)
         paths = [checks.file("a file of run_dir", self.path / name) for name in FILES]
         self._checkpoint_file, self.policy, self.curve, self._config_file = paths
 
@@ -60,6 +59,7 @@ class RunFolder:
                 f"run_dir {str(self.path)!r} holds a run with its own {' and '.join(own)}, whose "
                 "code is not kept; expected same_code=True if it is the same, or another folder"
             )
+        self._settings = settings_of_run(config, stack, change)
 
     @property
     def finished(self) -> bool:

@@ -19,7 +19,7 @@ def settings_of_run(
 
     Also the engine of its lifts, if it is not PyBullet.
     """
-    settings = config.plain() | plain({"change": change, "stack": stack})
+    settings = plain(vars(config) | {"change": change, "stack": stack})
     if config.env != task.HIGHEST_ITEM_ENV and engine_of() != ENGINES[0]:
         settings["engine"] = engine_of()
     return settings
