@@ -6,7 +6,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from copy import deepcopy
 from functools import cache
 from pathlib import Path
@@ -268,11 +268,9 @@ def train(
         with files.locked(folder.path), deferred_signals() as signals:
             if not folder.finished:  # by another process meanwhile
                 run = Training(config, stack, change)
-                try:
+                with closing(run.rollout):
                     folder.restore(run)
                     _finish(run, folder, progress, callback, signals)
-                finally:
-                    run.rollout.close()
     return _result(folder, config)
 
 

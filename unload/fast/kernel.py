@@ -15,7 +15,7 @@ CHUNK = 32  # samples whose gradients are summed in single precision
 _BLOCK = 64  # features handled together: loops of constant length become vector instructions
 _LANES = 16  # features in the longest vector: few enough to keep their sums in registers
 
-# What is kept of _BLOCK features is a table of rows of _BLOCK numbers, one feature a column:
+# A block holds all that is known of _BLOCK features: rows of _BLOCK numbers, one feature a column.
 #
 #     rows    name              what, for each feature
 #      0- 3   _WX … _BIAS       the extractor's weights of x, y and z, and its bias
@@ -29,7 +29,7 @@ _LANES = 16  # features in the longest vector: few enough to keep their sums in 
 #     33      _PART             what they add to the value before tanh
 #     34-41   _GRADIENT, …      of the extractor's weights and bias, and of _SCORE; four rows each
 #
-# The table lies in one flat array, and each name is where its first row starts there:
+# A block lies in one flat array, and each name is where its first row starts there:
 # ``block[_SLACK + f]`` belongs to feature f.
 _WX, _WY, _WZ, _BIAS = 0, _BLOCK, 2 * _BLOCK, 3 * _BLOCK
 _LOW, _LOW2, _HIGH, _HIGH2 = 4 * _BLOCK, 5 * _BLOCK, 6 * _BLOCK, 7 * _BLOCK
