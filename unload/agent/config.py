@@ -87,8 +87,8 @@ class TrainConfig:
         position_noise: * m, see ``ContainerEnv``; 0 ranks equal coordinates in the items' order.
         mask: * whether training may not choose either what has failed since the last success. If
             not, only rows without an item are excluded. The maximum in a target, which needs
-            ``gamma`` > 0, leaves failed items out in both cases; so does ``unload.evaluate``,
-            unless told otherwise.
+            ``gamma`` > 0, leaves failed items out in both cases, as ``unload.evaluate`` does by
+            default.
         gradient_steps: * updates per step of all environments.
         target_update_interval: * picks, as in Stable-Baselines3; without effect if gamma is 0.
         log_interval: * steps of all environments per point of the curve; 0 stands for a hundredth

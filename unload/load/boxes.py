@@ -54,7 +54,7 @@ class BoxError(ValueError):
     Attributes:
         boxes: their numbers.
         problem: of the first of them.
-        misplaced: whether it would be none at another place: not of an edge or an id.
+        misplaced: whether their places are the problem, and not an edge or an id.
     """
 
     def __init__(
