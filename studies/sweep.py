@@ -17,7 +17,7 @@ from joblib import Parallel, delayed
 from tqdm import tqdm
 
 from studies.results import code_of, run_record
-from unload.agent.config import TrainConfig, settings_of_run
+from unload.agent.config import TrainConfig
 from unload.agent.training import Training, train
 from unload.checkpoint.folder import RunFolder
 from unload.support import files
@@ -95,7 +95,7 @@ def _run(name: str, config: TrainConfig, folder: Path, change, code: str | None,
 
     try:
         # A finished run is only read, perhaps where nothing can be written.
-        finished = RunFolder(folder, settings_of_run(config, change=change)).finished
+        finished = RunFolder(folder, config, change=change, same_code=True).finished
         log_path = os.devnull if finished else folder / "log.txt"
         folder.mkdir(parents=True, exist_ok=True)
         check_code(folder, code)

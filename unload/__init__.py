@@ -9,9 +9,10 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from unload.support.checks import needed_for
+from unload.task import CONTAINER_ENV, HIGHEST_ITEM_ENV
 from unload.task import VERSION as __version__
 
-if TYPE_CHECKING:  # what ``_PLACES`` says, for type checkers
+if TYPE_CHECKING:  # what ``_MODULES`` says, for type checkers
     from unload.agent import policies as policies
     from unload.agent.config import TrainConfig as TrainConfig
     from unload.agent.dqn import DQN as DQN
@@ -34,7 +35,7 @@ if TYPE_CHECKING:  # what ``_PLACES`` says, for type checkers
     from unload.orders.packing_list import read_load as read_load
 
 # Where each public name is defined; a module has itself.
-_PLACES = {
+_MODULES = {
     "DQN": "agent.dqn",
     "ContainerEnv": "env.container",
     "Greedy": "agent.greedy",
@@ -56,15 +57,15 @@ _PLACES = {
     "train": "agent.training",
     "view": "drawing.view",
 }
-__all__ = ["__version__", *_PLACES]
+__all__ = ["__version__", *_MODULES]
 
 
 def _imported(name: str) -> object:
     """Import a public name (PEP 562)."""
-    if name not in _PLACES:
+    if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     with needed_for(f"unload.{name}"):
-        module = import_module(f"unload.{_PLACES[name]}")
+        module = import_module(f"unload.{_MODULES[name]}")
     value = getattr(module, name, module)
     globals()[name] = value  # found without this function the next time
     return value
@@ -85,11 +86,11 @@ def _register() -> None:
     import gymnasium
 
     for name, single, arrays in (
-        ("Container-v0", "container:ContainerEnv", "vector:ContainerVectorEnv"),
-        ("HighestItem-v0", "highest_item:HighestItemEnv", "highest_item:HighestItemVectorEnv"),
+        (CONTAINER_ENV, "container:ContainerEnv", "vector:ContainerVectorEnv"),
+        (HIGHEST_ITEM_ENV, "highest_item:HighestItemEnv", "highest_item:HighestItemVectorEnv"),
     ):
         entry, vector_entry = f"unload.env.{single}", f"unload.env.{arrays}"
-        gymnasium.register(f"unload/{name}", entry, vector_entry_point=vector_entry)
+        gymnasium.register(name, entry, vector_entry_point=vector_entry)
 
 
 _register()

@@ -16,14 +16,12 @@ from torch.nn.functional import smooth_l1_loss
 from unload import task
 from unload.env import observation
 from unload.env.equalization import equalize
+from unload.env.highest_item import GRID
 from unload.load.boxes import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE, Load
-from unload.load.substacks import build_load, stack_load
+from unload.load.substacks import stack_load
 from unload.network.peq import PEQNetwork
 from unload.physics.situation import RESOLUTION, Situation
 from unload.physics.table import TablePhysics, shared_table
-
-# Every place of a box (Fig. 3): 12 walls of variant 0 only, of 1 only, and of 2 only.
-GRID = np.concatenate([build_load(np.full((12, 3, 4), kind)).positions for kind in range(3)])
 
 
 # A lift (Sec. III-C): of all boxes that touch, a few decide whether another one can be lifted.
@@ -138,8 +136,10 @@ class Container(Task):
 
     def info(self) -> dict:
         held = self.visible >= 0
+        untried = held.copy()
+        untried[held] = ~self.failed[self.visible[held]]
         return {
-            "action_mask": (held & ~self.failed[self.visible]).astype(np.int8),
+            "action_mask": untried.astype(np.int8),
             "item_mask": held.astype(np.int8),
             "unloaded": np.int64((~self.present).sum()),
         }
@@ -149,6 +149,7 @@ class HighestItem(Task):
     """``unload/HighestItem-v0``: pick the highest of boxes at random places, without physics."""
 
     def fill(self) -> None:
+        """Draw from ``GRID``, all places that a box of a load can take (Fig. 3)."""
         self.places = GRID[self.np_random.integers(len(GRID), size=task.N_VISIBLE)]
         self.drift = observation.drift(task.N_VISIBLE, self.position_noise, self.np_random)
 

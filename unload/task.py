@@ -1,4 +1,4 @@
-"""The paper's numbers, each once and with its source; and the version of unload.
+"""The paper's numbers, each once and with its source; names of the tasks, and unload's version.
 
 Lengths in metres, forces in newtons, times in seconds. The container's axes are
 x (depth, 0 at the rear wall and 7 at the entrance), y (width) and z (height).
@@ -7,6 +7,9 @@ x (depth, 0 at the rear wall and 7 at the entrance), y (width) and z (height).
 import numpy as np
 
 VERSION = "0.3.0"  # of unload, as in pyproject.toml
+
+# Under which Gymnasium knows the container (Sec. III) and the tuning environment (Sec. IV-A).
+CONTAINER_ENV, HIGHEST_ITEM_ENV = "unload/Container-v0", "unload/HighestItem-v0"
 
 # Sec. III-A, scaling of the observation: inner size of the container.
 CONTAINER = np.array([7.0, 2.5, 2.5])
@@ -22,6 +25,10 @@ PADDING = -1.0  # in the rows without an item: a corner of the container, where 
 VIEWPOINT = np.array([7.0, 1.25, 2.5])
 # Sec. III-B, diagonal of W: y does not count, z counts more than x.
 DISTANCE_WEIGHTS = np.array([1.0, 0.0, 4.0])
+
+# Sec. III-F, ours: with ties="average", scaled coordinates this close to the next one share a rank.
+# Noise of a few mm is bridged, the 3.5 cm between the grid's heights (0.028 scaled) are not.
+TIE_TOLERANCE = 0.005
 
 # Sec. III-C and appendix: one attempt to lift an item.
 PICK_FORCE = 20.0

@@ -19,7 +19,6 @@ from studies.falls.laboratory import ERRS, THRESHOLDS
 from studies.statistics import PAPER_MSR
 from unload import task
 from unload.env.observation import POSITION_NOISE, SINK
-from unload.fast.ranking import TIE_TOLERANCE
 from unload.load import substacks
 from unload.support import files
 
@@ -41,7 +40,7 @@ def task_numbers() -> dict:
         "num_envs": task.NUM_ENVS,
         "position_noise": POSITION_NOISE,
         "sink": SINK,
-        "tie_tolerance": TIE_TOLERANCE,
+        "tie_tolerance": task.TIE_TOLERANCE,
         "cell": substacks.CELL,
         "cells_wide": substacks.CELLS_WIDE,
         "rows_high": substacks.CELLS_HIGH,

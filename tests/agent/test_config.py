@@ -10,7 +10,8 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from unload import ContainerEnv, TrainConfig, train
-from unload.agent.config import ENVS, EXPLORATION_FRACTION, settings_of_run
+from unload.agent.config import ENVS, EXPLORATION_FRACTION
+from unload.checkpoint.settings import settings_of_run
 from unload.env.vector import ContainerVectorEnv
 from unload.physics.bullet import ENGINES
 
@@ -45,7 +46,7 @@ def test_a_run_draws_other_loads_than_an_evaluation_of_its_seed():
 
 
 def test_settings_name_an_engine_that_is_not_the_reference_where_something_is_lifted(monkeypatch):
-    monkeypatch.setattr("unload.agent.config.engine_of", lambda: ENGINES[1])
+    monkeypatch.setattr("unload.checkpoint.settings.engine_of", lambda: ENGINES[1])
     assert settings_of_run(TrainConfig())["engine"] == ENGINES[1]
     assert "engine" not in settings_of_run(TrainConfig("unload/HighestItem-v0"))
 

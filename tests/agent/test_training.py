@@ -273,7 +273,7 @@ def test_the_last_pick_of_an_episode_leads_to_its_own_end(boxes, monkeypatch):
     monkeypatch.setattr(ContainerVectorEnv, "_lift", lambda *each: (look_up(*each)[0], np.zeros(1)))
     loads = iter([boxes((0.4, 0.2), (1.2, 0.2)), boxes((0.4, 0.2), (1.2, 0.2), (2.0, 0.2))])
     config = TrainConfig(**CONTAINER | {"num_envs": 1, "gamma": 0.9, "max_picks": 2})
-    rollout = Rollout(config, stack=lambda rng: next(loads))
+    rollout = Rollout(config, 0, stack=lambda rng: next(loads))
     rollout.pick(np.array([0]))
     picks, _ = rollout.pick(np.array([1]))
     assert np.flatnonzero(picks["next_masks"]).tolist() == [0, 1]

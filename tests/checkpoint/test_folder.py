@@ -36,16 +36,16 @@ def test_a_killed_run_goes_on_with_the_same_bits(tmp_path):
 def test_a_run_is_not_gone_on_with_by_another_engine(tmp_path, monkeypatch, begun_by, other):
     """Its name stands in the run's settings, unless it is the reference."""
     config = TrainConfig(**CONTAINER)
-    monkeypatch.setattr("unload.agent.config.engine_of", lambda: begun_by)
+    monkeypatch.setattr("unload.checkpoint.settings.engine_of", lambda: begun_by)
     interrupt_run(config, tmp_path, 3)
-    monkeypatch.setattr("unload.agent.config.engine_of", lambda: other)
+    monkeypatch.setattr("unload.checkpoint.settings.engine_of", lambda: other)
     with pytest.raises(ValueError, match=r"engine \(.* not .*\)"):
         train(config, tmp_path, progress=False)
 
 
 def test_a_folder_stays_the_same_one_wherever_the_process_goes(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    folder = RunFolder("run", {})
+    folder = RunFolder("run", TrainConfig())
     monkeypatch.chdir("/")
     assert folder.path == folder.policy.parent == tmp_path / "run"
 

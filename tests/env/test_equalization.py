@@ -5,7 +5,7 @@ import pytest
 
 from unload import equalize, task
 from unload.env import observation
-from unload.fast.ranking import TIE_TOLERANCE
+from unload.task import TIE_TOLERANCE
 
 
 def test_table_one():

@@ -3,7 +3,8 @@
 import numpy as np
 
 from unload.env.equalization import equalize
-from unload.fast.ranking import TIE_TOLERANCE, features, rank, remove, replace
+from unload.fast.ranking import features, rank, remove, replace
+from unload.task import TIE_TOLERANCE
 
 
 def test_ranks_are_those_of_a_stable_sort_whatever_comes_and_goes(rng):

@@ -1,6 +1,5 @@
 """A load: which boxes it accepts, and what it keeps of them."""
 
-import sys
 from contextlib import nullcontext
 from dataclasses import FrozenInstanceError
 
@@ -20,6 +19,7 @@ from unload.load.boxes import (
     check_supported,
     slabs,
 )
+from unload.support.compiled import Compiled
 
 FIELDS = ("positions", "sizes", "packages", "walls")
 
@@ -156,8 +156,11 @@ def test_the_container_is_the_papers_or_ones_own():
             one_box(positions=deep, container=container)
 
 
-def test_contacts_without_numba_are_the_same(full_load, monkeypatch):
+def test_contacts_that_are_not_compiled_are_the_same(full_load, monkeypatch):
     low, high = full_load.positions - full_load.sizes / 2, full_load.positions + full_load.sizes / 2
-    monkeypatch.delitem(sys.modules, "numba", raising=False)
-    for one, other in zip(full_load.contacts, _find_contacts(low, high)):
+    found = []
+    for compiled in (True, False):
+        monkeypatch.setattr(Compiled, "any_compiled", compiled)
+        found.append(_find_contacts(low, high))
+    for one, other in zip(*found):
         assert np.array_equal(one, other) and one.dtype == other.dtype == np.int32

@@ -1,7 +1,8 @@
 """The configuration of a training run (Sec. IV-B)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from functools import partial
 
 import gymnasium
 import numpy as np
@@ -11,29 +12,52 @@ from unload.checkpoint.settings import plain
 from unload.env.equalization import TIES
 from unload.env.observation import MOST_NOISE, POSITION_NOISE
 from unload.network.factory import NETWORKS
-from unload.physics.bullet import ENGINES, engine_of
 from unload.support import checks
 
-ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
-
-OPTIONS = {"ties": TIES, "network": tuple(NETWORKS)}
-ZERO_ALLOWED = ("seed", "gradient_steps", "log_interval")  # of the whole numbers
-# Upper limits of the real numbers; the lower one is 0.
-UPPER_LIMITS = {
-    "position_noise": MOST_NOISE, "epsilon_init": 1.0, "epsilon_final": 1.0, "gamma": 1.0,
-    "learning_rate": 1e37,  # Adam's steps have to fit into float32
-}  # fmt: skip
+ENVS = (task.CONTAINER_ENV, task.HIGHEST_ITEM_ENV)
 # K_ε / K, the share of the picks over which exploration falls (Sec. IV-B).
 EXPLORATION_FRACTION = 0.5
 
 
-def _registered(env: object) -> str:
+def _registered(name: str, env: object) -> str:
     spec = gymnasium.registry.get(env) if isinstance(env, str) else None
     if spec is None or spec.vector_entry_point is None:
         known = ", ".join(map(repr, ENVS))
         wanted = f"expected {known}, or an id that is registered with a vector_entry_point"
-        raise ValueError(f"env is {env!r}; {wanted}")
+        raise ValueError(f"{name} is {env!r}; {wanted}")
     return spec.id
+
+
+def _network(name: str, network: object) -> str | Callable:
+    return network if callable(network) else checks.one_of(name, network, NETWORKS)
+
+
+_COUNT, _COUNT_OR_ZERO = partial(checks.integer, low=1), partial(checks.integer, low=0)
+_SHARE = partial(checks.real, low=0, high=1.0)
+# What checks the value of each field, and returns it as one of Python's own types.
+_CHECKS: dict[str, Callable] = {
+    "env": _registered,
+    "picks": _COUNT,
+    "seed": _COUNT_OR_ZERO,
+    "num_envs": _COUNT,
+    "max_picks": _COUNT,
+    "learning_rate": partial(checks.real, low=0, high=1e37),  # Adam's steps must fit into float32
+    "batch_size": _COUNT,
+    "replay_size": _COUNT,
+    "epsilon_init": _SHARE,
+    "epsilon_final": _SHARE,
+    "gamma": _SHARE,
+    "beta": partial(checks.real, low=0),
+    "network": _network,
+    "n_features": _COUNT,
+    "equalize": checks.boolean,
+    "ties": partial(checks.one_of, options=TIES),
+    "position_noise": partial(checks.real, low=0, high=MOST_NOISE),
+    "mask": checks.boolean,
+    "gradient_steps": _COUNT_OR_ZERO,
+    "target_update_interval": _COUNT,
+    "log_interval": _COUNT_OR_ZERO,
+}
 
 
 @dataclass(frozen=True)
@@ -61,7 +85,10 @@ class TrainConfig:
         equalize: whether observations are equalized (Sec. III-F).
         ties: * ``"noise"`` or ``"average"``, see ``unload.equalize``.
         position_noise: * m, see ``ContainerEnv``; 0 ranks equal coordinates in the items' order.
-        mask: * whether failed items are masked in training's choices, too.
+        mask: * whether training may not choose either what has failed since the last success. If
+            not, only rows without an item are excluded. The maximum in a target, which needs
+            ``gamma`` > 0, leaves failed items out in both cases, as ``unload.evaluate`` does by
+            default.
         gradient_steps: * updates per step of all environments.
         target_update_interval: * picks, as in Stable-Baselines3; without effect if gamma is 0.
         log_interval: * steps of all environments per point of the curve; 0 stands for a hundredth
@@ -94,20 +121,8 @@ class TrainConfig:
     log_interval: int = 0
 
     def __post_init__(self) -> None:
-        # The default's type says what a field must be; what is kept is of Python's own types.
-        for field in fields(self):
-            name, value = field.name, getattr(self, field.name)
-            if isinstance(field.default, bool):
-                value = checks.boolean(name, value)
-            elif isinstance(field.default, int):
-                value = checks.integer(name, value, 0 if name in ZERO_ALLOWED else 1)
-            elif isinstance(field.default, float):
-                value = checks.real(name, value, 0, UPPER_LIMITS.get(name, np.inf))
-            elif name == "env":
-                value = _registered(value)
-            elif not (name == "network" and callable(value)):
-                value = checks.one_of(name, value, OPTIONS[name])
-            object.__setattr__(self, name, value)
+        for name, check in _CHECKS.items():
+            object.__setattr__(self, name, check(name, getattr(self, name)))
         hundredth = max(1, self.picks // self.num_envs // 100)
         object.__setattr__(self, "log_interval", self.log_interval or min(500, hundredth))
 
@@ -128,7 +143,7 @@ class TrainConfig:
 
     def plain(self) -> dict:
         """Return the fields as JSON can hold them, a function by its qualified name."""
-        return plain({field.name: getattr(self, field.name) for field in fields(self)})
+        return plain(vars(self))
 
     def epsilon(self, picks: int) -> float:
         """Exploration rate after ``picks`` picks: linear from init to final, then constant."""
@@ -141,15 +156,3 @@ class TrainConfig:
         The spawn key gives other loads than ``unload.evaluate`` draws with the same seed.
         """
         return tuple(np.random.SeedSequence(self.seed, spawn_key=(1,)).generate_state(3).tolist())
-
-
-def settings_of_run(
-    config: TrainConfig, stack: Callable | None = None, change: Callable | None = None
-) -> dict:
-    """What a run is: its configuration, and the names of its change and stack, None without.
-
-    Also the engine, if it is not PyBullet.
-    """
-    own = plain({"change": change, "stack": stack})
-    other = {"engine": engine_of()} if engine_of() != ENGINES[0] and config.env != ENVS[1] else {}
-    return config.plain() | own | other

@@ -17,8 +17,9 @@ from unload.support import checks
 class DQN:
     """Deep Q-learning on masked actions, with a target network.
 
-    The mask acts wherever an action is chosen: in exploration, in the greedy choice and
-    in the maximum of the bootstrap target.
+    What the caller's masks exclude counts nowhere: ``allowed`` is for exploration and for the
+    greedy choice, ``next_masks`` of a batch for the maximum in the bootstrap target. What training
+    excludes is said by ``TrainConfig.mask``.
 
     Args:
         network: (batch, items, 3) → (batch, items) action values.

@@ -112,8 +112,8 @@ def evaluate(
             envs = SyncVectorEnv([make], autoreset_mode=AutoresetMode.SAME_STEP)
         with closing(envs):
             frames.append(_play(envs, policy, seeds, mask, give_up=max_picks is None))
-    table = pd.concat(frames, ignore_index=True)
-    return table if max_picks is None else table.drop(columns=["picks", "emptied"])
+    frame = pd.concat(frames, ignore_index=True)
+    return frame if max_picks is None else frame.drop(columns=["picks", "emptied"])
 
 
 class _Chooser:
@@ -176,13 +176,13 @@ def _play(
             running &= failures < GIVE_UP
 
     # Of each environment, the picks of its own episode, which came first.
-    table = []
+    summaries = []
     for count, reward, failed in zip(picks, np.transpose(rewards), np.transpose(deadlocked)):
         reward, failed = reward[:count], failed[:count]
         ends = np.flatnonzero(np.diff(failed, prepend=0, append=0))  # of deadlocks, and starts
         longest = (ends[1::2] - ends[::2]).max(initial=0)
-        table.append((success_rate(reward), (reward > 0).sum(), failed.mean(), longest))
+        summaries.append((success_rate(reward), (reward > 0).sum(), failed.mean(), longest))
     frame = pd.DataFrame(
-        table, columns=["success_rate", "unloaded", "deadlocked", "longest_deadlock"]
+        summaries, columns=["success_rate", "unloaded", "deadlocked", "longest_deadlock"]
     )
     return frame.assign(picks=picks, emptied=emptied)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from unload.agent.config import TrainConfig, settings_of_run
+from unload.agent.config import TrainConfig
 from unload.agent.training import Training
 from unload.checkpoint.folder import RunFolder
 
@@ -33,8 +33,8 @@ def check_resume(
         ValueError: the message names the first array or number that differs.
         TypeError: what the message names cannot be kept in a file.
     """
-    with TemporaryDirectory() as place:
-        folder = RunFolder(place, settings_of_run(config, stack, change))
+    with TemporaryDirectory() as run_dir:
+        folder = RunFolder(run_dir, config, stack, change)
         run = Training(config, stack, change)
         with closing(run.rollout):
             while run.rollout.picks < config.picks // 2:

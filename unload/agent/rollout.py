@@ -19,6 +19,7 @@ class Rollout:
 
     Args:
         config: of the run.
+        seed: of the environments.
         stack: makes the loads, see ``unload.train``.
 
     Attributes:
@@ -30,8 +31,10 @@ class Rollout:
         steps: made so far; one pick in each environment per step.
     """
 
-    def __init__(self, config: TrainConfig, stack: Callable | None = None) -> None:
-        self._config, self.steps = config, 0
+    def __init__(self, config: TrainConfig, seed: int, stack: Callable | None = None) -> None:
+        self.steps = 0
+        self._num_envs, self._all_picks = config.num_envs, config.picks
+        self._mask, self._next_state = config.mask, config.gamma > 0
         own: dict[str, Any] = {} if stack is None else {"stack": stack}
         self.envs: Any = gymnasium.make_vec(
             config.env,
@@ -53,23 +56,23 @@ class Rollout:
         ):
             if space != wanted:
                 raise ValueError(f"env={config.env!r} has {space}; expected {wanted}")
-        self._observe(*self.envs.reset(seed=config.seeds()[0]))
+        self._observe(*self.envs.reset(seed=seed))
 
     def _observe(self, observations: np.ndarray, infos: dict[str, np.ndarray]) -> None:
         self.observations, self.masks = observations, infos["action_mask"]
         self._present = infos["item_mask"].astype(bool)
         masks = self.masks.astype(bool)
-        self.allowed = choosable(masks, self._present) if self._config.mask else self._present
+        self.allowed = choosable(masks, self._present) if self._mask else self._present
 
     @property
     def picks(self) -> int:
         """Picks so far, over all environments."""
-        return self.steps * self._config.num_envs
+        return self.steps * self._num_envs
 
     @property
     def finished(self) -> bool:
         """Whether all picks of the run have been made."""
-        return self.picks == self._config.picks
+        return self.picks == self._all_picks
 
     def deadlocked(self, actions: np.ndarray) -> np.ndarray:
         """Return which actions pick an item that failed since the last success, bool."""
@@ -93,7 +96,7 @@ class Rollout:
         ended, last = terminations | truncations, infos.get("final_info", {})
         unknown = np.full(len(actions), np.nan)
         distances = np.where(ended, last.get("distance", unknown), infos.get("distance", unknown))
-        if self._config.gamma > 0:
+        if self._next_state:
             observations, masks = following.copy(), infos["action_mask"].astype(bool)
             present = infos["item_mask"].astype(bool)
             for env in np.flatnonzero(ended):

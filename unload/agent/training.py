@@ -6,7 +6,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from copy import deepcopy
 from functools import cache
 from pathlib import Path
@@ -18,13 +18,14 @@ import torch
 from tqdm import tqdm
 
 from unload import task
-from unload.agent.config import ENVS, TrainConfig, settings_of_run
+from unload.agent.config import ENVS, TrainConfig
 from unload.agent.curve import Curve
 from unload.agent.dqn import DQN
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
 from unload.checkpoint.folder import RunFolder
+from unload.checkpoint.settings import settings_of_run
 from unload.load.boxes import Load, check_stack
 from unload.network.factory import make_network
 from unload.support import checks, files
@@ -91,7 +92,7 @@ class Training:
     ) -> None:
         self.config, self.settings = config, settings_of_run(config, stack, change)
         warn_of_other_bits(torch.backends.cpu.get_cpu_capability())
-        _, rng_seed, weights_seed = config.seeds()
+        envs_seed, rng_seed, weights_seed = config.seeds()
         self.rng = np.random.default_rng(rng_seed)
         generator = torch.Generator().manual_seed(weights_seed)
         network = make_network(config.network, config.n_features, generator)
@@ -99,7 +100,7 @@ class Training:
         size = min(config.replay_size, config.picks)
         self.replay = ReplayBuffer(size, task.N_VISIBLE, next_state=config.gamma > 0)
         self.curve = Curve()
-        self.rollout = Rollout(config, stack)
+        self.rollout = Rollout(config, envs_seed, stack)
         self.kept: dict[str, np.ndarray] = {}
         if change is not None:
             change(self)
@@ -260,20 +261,16 @@ def train(
         raise TypeError(f"change is {change!r}; expected a function of a Training")
     if stack is not None:
         check_stack(stack)
-        if config.env == ENVS[1]:
+        if config.env == task.HIGHEST_ITEM_ENV:
             raise ValueError(f"stack is given; expected None for env={config.env!r}")
-    same_code = checks.boolean("same_code", same_code)
-    folder = RunFolder(run_dir, settings_of_run(config, stack, change), same_code)
-    folder.check_code(stack=stack, change=change, network=config.network)
+    folder = RunFolder(run_dir, config, stack, change, same_code)
     if not folder.finished:  # else it is only read, perhaps where nothing can be written
         with files.locked(folder.path), deferred_signals() as signals:
             if not folder.finished:  # by another process meanwhile
                 run = Training(config, stack, change)
-                try:
+                with closing(run.rollout):
                     folder.restore(run)
                     _finish(run, folder, progress, callback, signals)
-                finally:
-                    run.rollout.close()
     return _result(folder, config)
 
 
@@ -281,8 +278,7 @@ def finished_run(
     run_dir: str | Path, config: TrainConfig, change: Callable[[Training], None] | None = None
 ) -> TrainResult:
     """Read back a finished run of the same code, as ``train`` does with ``same_code``."""
-    settings = settings_of_run(config, change=change)
-    return _result(RunFolder(run_dir, settings, same_code=True), config)
+    return _result(RunFolder(run_dir, config, change=change, same_code=True), config)
 
 
 def _result(folder: RunFolder, config: TrainConfig) -> TrainResult:
@@ -305,7 +301,7 @@ def _finish(
     If it is stopped between two steps, there is a checkpoint of the last one, unless a weight is no
     longer finite; after an error inside of a step there is the one before, if any.
     """
-    rollout, step_complete = run.rollout, True
+    rollout = run.rollout
     checkpoint_saved, curve_saved = time.monotonic(), 0.0
     bar = tqdm(
         total=run.config.picks, initial=rollout.picks, unit="pick", unit_scale=True,
@@ -314,44 +310,58 @@ def _finish(
     )  # fmt: skip
     try:
         while not rollout.finished:
-            step_complete = False  # after an error in a step nothing can be saved
+            points_before = len(run.curve.points)
             run.step()
-            step_complete = True
-            bar.update(run.config.num_envs)
             if time.monotonic() - checkpoint_saved > CHECKPOINT_INTERVAL and not rollout.finished:
-                run.agent.check_finite()
-                folder.save(run)
+                _save_checkpoint(run, folder)
                 checkpoint_saved = time.monotonic()
 
-            if not run.curve.sums["picks"]:  # end_point has just emptied them
-                point = run.curve.points[-1]
-                shares = {"MSR": f"{point.success_rate:.1%}", "loss": f"{point.loss:.3f}"}
-                bar.set_postfix(shares, refresh=False)
-                if time.monotonic() - curve_saved > CURVE_INTERVAL:
-                    folder.save_curve(run.curve.csv())
-                    curve_saved = time.monotonic()
-                answer = None if callback is None else callback(point._asdict())
-                if isinstance(answer, (bool, np.bool_)) and not answer:
-                    break
-            if signals:
-                raise KeyboardInterrupt(
-                    f"stopped after {rollout.picks} picks; call train again with "
-                    f"run_dir={str(folder.path)!r} to go on"
-                )
+            with _checkpoint_if_stopped(run, folder, signals):
+                bar.update(rollout.picks - bar.n)
+                if len(run.curve.points) > points_before:
+                    point = run.curve.points[-1]
+                    shares = {"MSR": f"{point.success_rate:.1%}", "loss": f"{point.loss:.3f}"}
+                    bar.set_postfix(shares, refresh=False)
+                    if time.monotonic() - curve_saved > CURVE_INTERVAL:
+                        folder.save_curve(run.curve.csv())
+                        curve_saved = time.monotonic()
+                    answer = None if callback is None else callback(point._asdict())
+                    if isinstance(answer, (bool, np.bool_)) and not answer:
+                        break
+                if signals:
+                    raise KeyboardInterrupt(
+                        f"stopped after {rollout.picks} picks; call train again with "
+                        f"run_dir={str(folder.path)!r} to go on"
+                    )
+
         run.agent.check_finite()
-        save_policy(run.policy(), folder.policy)
-        folder.save_curve(run.curve.csv())
-        folder.finish()
+        with _checkpoint_if_stopped(run, folder, signals):
+            save_policy(run.policy(), folder.policy)
+            folder.save_curve(run.curve.csv())
+            folder.finish()
     except FloatingPointError as error:
-        step_complete = False
         raise FloatingPointError(
             f"after {rollout.picks} picks: {error}; the last checkpoint, if any, is kept"
         ) from error
     finally:
         bar.close()
-        if step_complete and not folder.finished and len(signals) < 2:
-            run.agent.check_finite()
-            folder.save(run)
+
+
+@contextmanager
+def _checkpoint_if_stopped(run: Training, folder: RunFolder, signals: list[int]) -> Iterator[None]:
+    """Write a checkpoint if the block, which stands between two steps, ends in an error."""
+    try:
+        yield
+    except BaseException:  # Ctrl-C, too; a second one stops at once
+        if len(signals) < 2:
+            _save_checkpoint(run, folder)
+        raise
+
+
+def _save_checkpoint(run: Training, folder: RunFolder) -> None:
+    """Write a checkpoint; raise FloatingPointError instead if a weight is no longer finite."""
+    run.agent.check_finite()
+    folder.save(run)
 
 
 @contextmanager

@@ -2,12 +2,13 @@
 
 import json
 import warnings
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from unload.checkpoint.settings import package
+from unload.checkpoint.settings import package, settings_of_run
 from unload.support import checks, files
 
 FORMAT = 14  # of the checkpoints
@@ -20,32 +21,37 @@ class RunFolder:
 
     Args:
         run_dir: its path.
-        settings: what the run is, as JSON can hold it.
+        config, stack, change: of the run, see ``unload.train``.
         same_code: whether the caller says that the run was begun with the same code.
 
     Attributes:
         path: of the folder, absolute, so that it stays the same one wherever the process goes.
         policy: the file of the trained policy.
         curve: the file of the learning curve.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described; or the folder holds a run of the
+            caller's own functions, of which only names are kept, and not ``same_code``.
     """
 
-    def __init__(self, run_dir: str | Path, settings: dict, same_code: bool = False) -> None:
+    def __init__(
+        self,
+        run_dir: str | Path,
+        config: Any,
+        stack: Callable | None = None,
+        change: Callable | None = None,
+        same_code: bool = False,
+    ) -> None:
         path = checks.path("run_dir", run_dir)
         text = str(path.absolute())  # safetensors opens a name in UTF-8 only
         if path == Path() or "\0" in text or text.encode(errors="ignore").decode() != text:
             wanted = "expected a folder of the run's own, with a name in UTF-8"
             raise ValueError(f"run_dir is {str(run_dir)!r}; {wanted}")
-        self.path, self._settings, self._same_code = path.absolute(), settings, same_code
+        self.path, self._same_code = path.absolute(), checks.boolean("same_code", same_code)
         paths = [checks.file("a file of run_dir", self.path / name) for name in FILES]
         self._checkpoint_file, self.policy, self.curve, self._config_file = paths
 
-    @property
-    def finished(self) -> bool:
-        """Whether the run has ended, and its policy is whole."""
-        return self._config_file.exists()
-
-    def check_code(self, **functions: object) -> None:
-        """Refuse to go on with a run of the caller's functions, of which only names are kept."""
+        functions = {"stack": stack, "change": change, "network": config.network}
         own = [name for name, value in functions.items() if callable(value)]
         begun = self.finished or self._checkpoint_file.exists()
         if own and begun and not self._same_code:
@@ -53,6 +59,12 @@ class RunFolder:
                 f"run_dir {str(self.path)!r} holds a run with its own {' and '.join(own)}, whose "
                 "code is not kept; expected same_code=True if it is the same, or another folder"
             )
+        self._settings = settings_of_run(config, stack, change)
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run has ended, and its policy is whole."""
+        return self._config_file.exists()
 
     def save(self, run: Any) -> None:
         """Write the ``state_dict()`` of a run as its checkpoint."""

@@ -1,5 +1,6 @@
 """What a run is known by, as JSON can hold it: arguments, and the code that uses them."""
 
+from collections.abc import Callable
 from functools import cache, partial
 from hashlib import blake2b
 from typing import Any
@@ -7,7 +8,21 @@ from typing import Any
 import numpy as np
 
 from unload import task
+from unload.physics.bullet import ENGINES, engine_of
 from unload.support import files
+
+
+def settings_of_run(
+    config: Any, stack: Callable | None = None, change: Callable | None = None
+) -> dict:
+    """What a run is: its ``TrainConfig``, and the names of its stack and change, None without.
+
+    Also the engine of its lifts, if it is not PyBullet.
+    """
+    settings = plain(vars(config) | {"change": change, "stack": stack})
+    if config.env != task.HIGHEST_ITEM_ENV and engine_of() != ENGINES[0]:
+        settings["engine"] = engine_of()
+    return settings
 
 
 def plain(value: Any) -> Any:

@@ -125,7 +125,7 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         self.single_action_space = Discrete(task.N_VISIBLE)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._rngs: list[np.random.Generator] = []
+        self._rngs: list[Any] = [None] * self.num_envs  # a generator each, from the reset on
         self._picks = np.zeros(self.num_envs, np.int64)  # of each episode so far
 
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: dict | None = None):
@@ -157,10 +157,10 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
             seeds = [None] * self.num_envs
         else:
             seeds = [checks.integer("seed", seed, 0) + env for env in range(self.num_envs)]
-        rngs = [
-            rng if rng is not None and (one is None or not new) else seeding.np_random(one)[0]
-            for one, new, rng in zip(seeds, chosen, self._rngs or [None] * self.num_envs)
-        ]
+        rngs = list(self._rngs)
+        for env in np.flatnonzero(chosen):
+            if seeds[env] is not None or rngs[env] is None:
+                rngs[env], _ = seeding.np_random(seeds[env])
         self._begin(chosen, rngs, **options)
         return self._copy_observations(), _flagged(self._infos(), chosen)
 
@@ -171,41 +171,49 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         ``SAME_STEP``, ``infos["final_obs"]`` and ``infos["final_info"]`` hold the last ones then.
         """
         self._check_started()
-        # Where the episode was over before this step. With SAME_STEP there are none.
-        over = self._emptied() | (self._picks == self.max_picks)
-        if over.any() and self.autoreset_mode is AutoresetMode.DISABLED:
+        # Where an episode has ended in an earlier step, it waits for a reset. With SAME_STEP, none.
+        waiting = self._emptied() | (self._picks == self.max_picks)
+        if waiting.any() and self.autoreset_mode is AutoresetMode.DISABLED:
             raise ResetNeeded("an episode is finished; call reset with a reset_mask first")
         last_row = task.N_VISIBLE - 1
         actions = checks.integer_array("actions", actions, (self.num_envs,), last_row)
 
         self._state = "broken off"  # until all is done
-        rewards, picked = self._pick(actions, ~over)
+        rewards, picked = self._pick(actions, ~waiting)
         self._picks += 1
-        if over.any():  # NEXT_STEP: the next one begins instead of a pick
-            rewards[over] = 0
-            self._begin(over, self._rngs)
+
+        # NEXT_STEP: where one waits, the next one begins, and the action has not counted.
+        fresh = waiting
+        if waiting.any():
+            rewards[waiting] = 0
+            self._begin(waiting, self._rngs)
         terminations, truncations = self._emptied(), self._picks == self.max_picks
 
-        # Where it ended by this pick. With SAME_STEP the next one begins at once, and what the last
-        # pick showed goes aside, as Gymnasium wants it.
+        # SAME_STEP: where one has ended by this pick, the next one begins at once, and what was
+        # last seen of the old one goes aside.
         final: dict[str, Any] = {}
-        ended, begun = terminations | truncations, over
+        ended = terminations | truncations
         if ended.any() and self.autoreset_mode is AutoresetMode.SAME_STEP:
-            last, begun = self._copy_observations(), ended
-            observations = np.full(self.num_envs, None)
-            for env in np.flatnonzero(ended):
-                observations[env] = last[env]
-            final_infos = _flagged(self._infos() | picked, ended)
-            final = {"final_obs": observations, "_final_obs": ended}
-            final |= {"final_info": final_infos, "_final_info": ended}
+            final, fresh = self._final_infos(ended, picked), ended
             self._begin(ended, self._rngs)
 
-        # The infos are the reset's where an episode has begun, and the pick's elsewhere.
+        # The infos are a reset's where there was one, and the pick's elsewhere.
         infos = _flagged(self._infos(), np.ones(self.num_envs, bool))
-        if not begun.all():  # a reset has no infos about a pick
-            infos |= _flagged(picked, ~begun)
+        if not fresh.all():  # a reset has no infos about a pick
+            infos |= _flagged(picked, ~fresh)
         self._state = "running"
         return self._copy_observations(), rewards, terminations, truncations, infos | final
+
+    def _final_infos(self, ended: np.ndarray, picked: dict[str, np.ndarray]) -> dict[str, Any]:
+        """What the last pick of ``ended`` episodes, (num_envs,) bool, showed, as in Gymnasium."""
+        observations, last = np.full(self.num_envs, None), self._copy_observations()
+        for env in np.flatnonzero(ended):
+            observations[env] = last[env]
+        infos = _flagged(self._infos() | picked, ended)
+        return {
+            "final_obs": observations, "_final_obs": ended,
+            "final_info": infos, "_final_info": ended,
+        }  # fmt: skip
 
     def action_masks(self) -> np.ndarray:
         """(num_envs, 128) bool, False for rows without a box, or failed since the last success."""

@@ -1,4 +1,8 @@
-"""The container as a Gymnasium environment (Sec. III-A to III-D)."""
+"""The container as a Gymnasium environment (Sec. III-A to III-D).
+
+All is done by a ``ContainerVectorEnv`` of one container, or by a ``FullContainer``, which is one
+whose boxes are all simulated. ``ContainerEnv`` shows its first row.
+"""
 
 from collections.abc import Callable
 from typing import Any, Literal
@@ -10,7 +14,7 @@ from unload import task
 from unload.env.base import PickingEnv
 from unload.env.full import FullContainer
 from unload.env.observation import POSITION_NOISE
-from unload.env.vector import OneContainer
+from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import Load
 from unload.load.substacks import stack_load
 from unload.physics.full import FullPhysics
@@ -77,13 +81,18 @@ class ContainerEnv(PickingEnv):
     - ``distance``: float64, how far it moved in m.
 
     Args:
-        physics: what is simulated at a lift: ``"local"`` (the situation of the chosen box),
-            ``"full"`` (every box: seconds a pick) or ``"table"`` (``"local"``, remembered), which
-            answers without a simulation if nothing rests on the chosen box (it moves by
-            0.463053 m), if three boxes or more do, or one or two on its middle (0 m); or
-            ``"places"``, which says that whatever has a box on it is held down, and errs where
-            PyBullet tips it off: in notebook 22 for 0 to 1 % of such boxes. Or a ``LocalPhysics``
-            of your own, or a ``FullPhysics``, whose container is filled.
+        physics: what is simulated at a lift:
+
+            - ``"local"``: the situation of the chosen box. It is the default here, because each
+              distance is the engine's own then;
+            - ``"table"``: ``"local"``, remembered. It answers without a simulation if nothing rests
+              on the chosen box (it moves by 0.463053 m), if three boxes or more do, or one or two
+              on its middle (0 m);
+            - ``"places"``: nothing. Whatever has a box on it is held down, which errs where
+              PyBullet tips it off: in notebook 22 for 0 to 1 % of such boxes;
+            - ``"full"``: every box, which takes seconds a pick.
+
+            Or a ``LocalPhysics`` of your own, or a ``FullPhysics``, whose container is filled.
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
         max_picks: greatest length of an episode.
@@ -110,7 +119,7 @@ class ContainerEnv(PickingEnv):
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
-    _envs: OneContainer
+    _envs: ContainerVectorEnv
 
     def __init__(
         self,
@@ -125,22 +134,22 @@ class ContainerEnv(PickingEnv):
         settings: dict[str, Any] = {"equalize": equalize, "ties": ties, "max_picks": max_picks}
         settings |= {"position_noise": position_noise, "stack": stack}
         settings |= {"autoreset_mode": AutoresetMode.DISABLED}
-        envs: OneContainer
+        envs: ContainerVectorEnv
         if isinstance(physics, FullPhysics) or physics == "full":
             envs = FullContainer(FullPhysics() if isinstance(physics, str) else physics, settings)
         else:
-            envs = OneContainer(1, physics, **settings)
+            envs = ContainerVectorEnv(1, physics, **settings)
         super().__init__(envs, render_mode)
 
     @property
     def load(self) -> Load:
         self._check_started()
-        return self._envs.load
+        return self._envs._loads[0]
 
     @property
     def present(self) -> np.ndarray:
         self._check_started()
-        return self._envs.present
+        return self._envs._present(0)
 
     @property
     def visible(self) -> np.ndarray:
@@ -161,7 +170,7 @@ class ContainerEnv(PickingEnv):
     def observed_positions(self) -> np.ndarray:
         """(n, 3) float64, where all items of the load are seen to be, in m."""
         self._check_started()
-        return self._envs.seen.copy()
+        return self._envs._seen_at[0].copy()
 
     def render(self) -> np.ndarray | None:
         """(480, 640, 3) uint8 for ``render_mode="rgb_array"``, else None."""
@@ -170,4 +179,7 @@ class ContainerEnv(PickingEnv):
             return None
         from unload.drawing.picture import snapshot  # here, because few look and Matplotlib is slow
 
-        return snapshot(self.load, self.present, self._envs.positions())
+        physics, positions = self.physics, self.load.positions
+        if isinstance(physics, FullPhysics):  # in which boxes move
+            positions = physics.positions()
+        return snapshot(self.load, self.present, positions)

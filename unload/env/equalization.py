@@ -3,7 +3,6 @@
 import numpy as np
 
 from unload import task
-from unload.fast.ranking import TIE_TOLERANCE
 from unload.support import checks
 
 TIES = ("noise", "average")
@@ -66,12 +65,12 @@ def equalize(
 
 
 def _shared_ranks(ordered: np.ndarray) -> np.ndarray:
-    """The mean rank of each run of values at most ``TIE_TOLERANCE`` apart, sorted on axis -2."""
+    """The mean rank of each run of tied values, see ``task``, which are sorted on axis -2."""
     items = ordered.shape[-2]
     index = np.broadcast_to(np.arange(items)[:, None], ordered.shape)
     opens = np.ones(ordered.shape, dtype=bool)
     with np.errstate(invalid="ignore"):  # inf - inf, between rows without an item
-        opens[..., 1:, :] = np.diff(ordered, axis=-2) > TIE_TOLERANCE
+        opens[..., 1:, :] = np.diff(ordered, axis=-2) > task.TIE_TOLERANCE
     closes = np.ones(ordered.shape, dtype=bool)
     closes[..., :-1, :] = opens[..., 1:, :]
     first = np.maximum.accumulate(np.where(opens, index, 0), axis=-2)

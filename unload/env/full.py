@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 
-from unload.env.vector import OneContainer
+from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import Load, check_supported
 from unload.physics.full import FullPhysics
 
 
-class FullContainer(OneContainer):
-    """One container, lifted by a ``FullPhysics`` that is filled and emptied along with it.
+class FullContainer(ContainerVectorEnv):
+    """A single container, lifted by a ``FullPhysics`` that is filled and emptied along with it.
 
     Args:
         physics: what is filled.
@@ -33,10 +33,11 @@ class FullContainer(OneContainer):
         self, envs: np.ndarray, rngs: list[np.random.Generator], load: Load | None = None
     ) -> None:
         super()._fill(envs, rngs, load)
-        self.physics.reset(self.load)
-        self._failed = np.zeros(len(self.load), bool)
+        (filled,) = self._loads
+        self.physics.reset(filled)
+        self._failed = np.zeros(len(filled), bool)
         if self._drifts:
-            self._show(0, np.arange(len(self.load)), self.physics.positions(), self.load)
+            self._show(0, np.arange(len(filled)), self.physics.positions(), filled)
 
     def _lift(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         item = int(self._containers.visible[0, actions[0]])
@@ -57,9 +58,10 @@ class FullContainer(OneContainer):
 
         # Boxes that may have moved are all seen anew; what has failed stays so.
         if self._drifts:
-            visible = self._containers.visible[0]
-            self._show(0, np.flatnonzero(self.present), self.physics.positions(), self.load)
-            self._containers.masks[0] &= ~self._failed[visible]
+            left = np.flatnonzero(self._present(0))
+            self._show(0, left, self.physics.positions(), self._loads[0])
+            visible = self._containers.visible[0, : len(left)]  # behind them there may be no box
+            self._containers.masks[0, : len(visible)] &= ~self._failed[visible]
         return rewards, picked
 
     def liftable(self) -> np.ndarray:
@@ -67,6 +69,3 @@ class FullContainer(OneContainer):
         if self._drifts:
             raise ValueError("lifts move other boxes; expected a physics that restores them")
         return super().liftable()
-
-    def positions(self) -> np.ndarray:
-        return self.physics.positions()

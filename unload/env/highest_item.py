@@ -30,18 +30,18 @@ class HighestItemVectorEnv(PickingVectorEnv):
     def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator]) -> None:
         # Each environment draws from a generator of its own.
         shape = len(rngs), task.N_VISIBLE
-        places, noise = np.empty((*shape, 3)), np.empty((*shape, 3))
+        exact, noise = np.empty((*shape, 3)), np.empty((*shape, 3))
         for number, rng in enumerate(rngs):
-            places[number] = GRID[rng.integers(len(GRID), size=task.N_VISIBLE)]
+            exact[number] = GRID[rng.integers(len(GRID), size=task.N_VISIBLE)]
             noise[number] = drift(task.N_VISIBLE, self.position_noise, rng)
 
         # The rest is done for all environments at once.
-        positions = (places + noise).reshape(-1, 3)
+        positions = (exact + noise).reshape(-1, 3)
         order = observation.distance(positions).reshape(shape).argsort(axis=1, kind="stable")
         rows = order[:, :, np.newaxis]
         seen = np.take_along_axis(scale(positions).reshape(*shape, 3), rows, axis=1)
         self._observations[envs] = equalize(seen, self.ties) if self.equalize else seen
-        heights = np.take_along_axis(places[..., 2], order, axis=1)
+        heights = np.take_along_axis(exact[..., 2], order, axis=1)
         highest = heights.max(axis=1, keepdims=True)
         self._highest[envs] = heights > highest - _HEIGHT_TOLERANCE
 

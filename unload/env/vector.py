@@ -23,7 +23,8 @@ class ContainerVectorEnv(PickingVectorEnv):
     See ``ContainerEnv`` for the task and for the arguments not explained here.
 
     Args:
-        physics: ``"table"``, ``"places"``, ``"local"``, or a ``LocalPhysics`` of your own. Of yours
+        physics: ``"table"``, which is the fastest, and so the default here, where picks are made by
+            the million; ``"places"``, ``"local"``, or a ``LocalPhysics`` of your own. Of yours
             ``simulate`` is called, for each pick that does not repeat a failed one, and ``close``;
             a ``TablePhysics`` is asked only what neither its table nor a rule answers.
 
@@ -48,6 +49,10 @@ class ContainerVectorEnv(PickingVectorEnv):
         self.stack = stack
         self.physics: Any = make_physics(physics)
         self._containers = containers.allocate(self.num_envs, 0, 0)
+        # Of each container: its load, and where all items of it are seen to be, (n, 3) in m. No
+        # step needs them, so that no checkpoint keeps them; a single environment shows them.
+        self._loads: list[Any] = [None] * self.num_envs
+        self._seen_at: list[Any] = [None] * self.num_envs
 
     def close_extras(self, **kwargs) -> None:
         self.physics.close()
@@ -57,6 +62,10 @@ class ContainerVectorEnv(PickingVectorEnv):
     def visible(self) -> np.ndarray:
         self._check_started()
         return self._containers.visible.copy()
+
+    def _present(self, env: int) -> np.ndarray:
+        """(n,) bool, which items of a container's load have not been unloaded."""
+        return self._containers.present[env, : len(self._loads[env])].copy()
 
     def liftable(self) -> np.ndarray:
         """(num_envs, 128) bool, which rows of the observations can be unloaded now."""
@@ -97,6 +106,7 @@ class ContainerVectorEnv(PickingVectorEnv):
     def _show(self, env: int, items: np.ndarray, positions: np.ndarray, load: Load) -> None:
         """Show the items that are left, (k,) int64, where all are seen to be, (n, 3) in m."""
         state = self._containers
+        self._loads[env], self._seen_at[env] = load, positions
         order = observation.nearest(positions[items], len(items), load.container)
         first = state.unloaded[env]
         state.by_distance[env, first : first + len(items)] = items[order]
@@ -165,20 +175,3 @@ class ContainerVectorEnv(PickingVectorEnv):
             "item_mask": (self._containers.visible >= 0).view(np.int8),
             "unloaded": self._containers.unloaded.copy(),
         }
-
-
-class OneContainer(ContainerVectorEnv):
-    """A vector environment of one container, which remembers its load and where it is seen."""
-
-    def _show(self, env: int, items: np.ndarray, positions: np.ndarray, load: Load) -> None:
-        self.load, self.seen = load, positions
-        super()._show(env, items, positions, load)
-
-    @property
-    def present(self) -> np.ndarray:
-        """(n,) bool, which items of the load have not been unloaded."""
-        return self._containers.present[0, : len(self.load)].copy()
-
-    def positions(self) -> np.ndarray:
-        """(n, 3) float64, where the items are, in m."""
-        return self.load.positions

@@ -15,29 +15,33 @@ CHUNK = 32  # samples whose gradients are summed in single precision
 _BLOCK = 64  # features handled together: loops of constant length become vector instructions
 _LANES = 16  # features in the longest vector: few enough to keep their sums in registers
 
-# What is kept of _BLOCK features is a table of rows of _BLOCK numbers, one feature a column:
+# A block holds all that is known of _BLOCK features: rows of _BLOCK numbers, one feature a column.
 #
 #     rows    name              what, for each feature
-#      0- 3   _X … _CONSTANT    the extractor's weights of x, y and z, and its bias
+#      0- 3   _WX … _BIAS       the extractor's weights of x, y and z, and its bias
 #      4- 5   _LOW, _LOW2       keys of the lowest value, and of the lowest but one
 #      6- 7   _HIGH, _HIGH2     keys of the highest value, and of the highest but one
 #      8-23   _MEAN … _HIGHEST  inputs x, y, z and 1: their mean, the chosen item's, those of the
-#                               lowest and of the highest item; four rows each
+#                               lowest and of the highest item; groups of four rows each
 #     24      _SLACK            values closer than this may be in the wrong order
 #     25-32   _SCORE, _FEATURE  the scorer's weights, and the features: of the chosen item, the
 #                               minimum, the maximum and the mean; four rows each
 #     33      _PART             what they add to the value before tanh
 #     34-41   _GRADIENT, …      of the extractor's weights and bias, and of _SCORE; four rows each
 #
-# The table lies in one flat array, and each name is where its first row starts there.
-_X, _Y, _Z, _CONSTANT = 0, _BLOCK, 2 * _BLOCK, 3 * _BLOCK
-_WX, _WY, _WZ, _BIAS = _X, _Y, _Z, _CONSTANT
+# A block lies in one flat array, and each name is where its first row starts there:
+# ``block[_SLACK + f]`` belongs to feature f.
+_WX, _WY, _WZ, _BIAS = 0, _BLOCK, 2 * _BLOCK, 3 * _BLOCK
 _LOW, _LOW2, _HIGH, _HIGH2 = 4 * _BLOCK, 5 * _BLOCK, 6 * _BLOCK, 7 * _BLOCK
 _MEAN, _OWN, _LOWEST, _HIGHEST = 8 * _BLOCK, 12 * _BLOCK, 16 * _BLOCK, 20 * _BLOCK
 _SLACK, _SCORE, _FEATURE, _PART = 24 * _BLOCK, 25 * _BLOCK, 29 * _BLOCK, 33 * _BLOCK
 _GRADIENT, _SCORE_GRADIENT, _SIZE = 34 * _BLOCK, 38 * _BLOCK, 42 * _BLOCK
+# From the start of a group of inputs to the row of one of them: ``block[_HIGHEST + _Z + f]`` is z
+# of the item that is highest in feature f.
+_X, _Y, _Z, _CONSTANT = 0, _BLOCK, 2 * _BLOCK, 3 * _BLOCK
 
 _FRACTION = 0x7FFFFF  # the bits of a float32 after its sign and exponent
+_ABOVE_ALL, _BELOW_ALL = 0x7FFFFFFF, -0x80000000  # the largest and the smallest int32: see ``_key``
 _ZERO, _ONE = np.float32(0), np.float32(1)
 
 
@@ -206,10 +210,10 @@ def _reduce_items(inputs, items, mask, block):
     side.
     """
     _long_vectors()
-    # Every value is below the first lowest and above the first highest.
+    # Every key is below the first lowest and above the first highest.
     for f in range(_BLOCK):
-        block[_LOW + f] = block[_LOW2 + f] = _number(0x7FFFFFFF)
-        block[_HIGH + f] = block[_HIGH2 + f] = _number(-0x80000000)
+        block[_LOW + f] = block[_LOW2 + f] = _number(_ABOVE_ALL)
+        block[_HIGH + f] = block[_HIGH2 + f] = _number(_BELOW_ALL)
         for axis in range(4):
             block[_MEAN + axis * _BLOCK + f] = _ZERO
     for first in range(0, _BLOCK, _LANES):
@@ -262,8 +266,10 @@ def _key(value, item, mask):
     """The value's bits, the lowest of them replaced by the item's number: an int32.
 
     Keys of positive values are in the order of the values, and all below them are the keys of
-    negative values, in reverse order. So the lowest of all keys tells what the ReLU needs: the
-    lowest value if all are positive, else the negative value nearest to zero.
+    negative values, in reverse order: by their keys, -0.5, -2, 1 and 3 stand in this order. So the
+    lowest and the highest key are of what the ReLU needs. Here they are those of -0.5, which
+    becomes 0, and of 3. Of 1 and 3 alone they are those of 1 and 3; of -0.5 and -2 alone both are
+    negative, and whatever is negative becomes 0.
     """
     return np.int32(np.int32(_bits(value) & ~mask) | item)
 

@@ -12,9 +12,6 @@ import numpy as np
 from unload import task
 from unload.support.compiled import compiled
 
-# Suits scaled positions: noise of a few mm is bridged, the 3.5 cm between the grid's heights
-# (0.028 scaled) are not.
-TIE_TOLERANCE = 0.005
 # The equalized coordinate (2 r - (N-1)) / (N-1) by N and by twice the rank, which ties make
 # odd. An item that is alone gets 0.
 _LEVELS = np.zeros((task.N_VISIBLE + 1, 2 * task.N_VISIBLE - 1), np.float32)
@@ -60,13 +57,13 @@ def remove(values, ranks, row):
 
 @compiled
 def _twice_shared_ranks(values, ranks, twice):
-    """Fill ``twice`` by twice the mean rank of each run of sorted values in ``TIE_TOLERANCE``."""
+    """Fill ``twice`` by twice the mean rank of each run of tied values, see ``task``."""
     order = np.empty(len(values), np.int32)
     for i in range(len(values)):
         order[ranks[i]] = i
     first = 0
     for r in range(len(values)):
-        if r + 1 == len(values) or values[order[r + 1]] - values[order[r]] > TIE_TOLERANCE:
+        if r + 1 == len(values) or values[order[r + 1]] - values[order[r]] > task.TIE_TOLERANCE:
             for member in range(first, r + 1):
                 twice[order[member]] = first + r
             first = r + 1

@@ -49,11 +49,20 @@ class Contacts(NamedTuple):
 
 
 class BoxError(ValueError):
-    """Boxes that no load can hold: ``boxes``, their numbers, and the ``problem`` of the first."""
+    """Boxes that no load can hold.
 
-    def __init__(self, boxes: Sequence[int] | np.ndarray, problem: str) -> None:
-        super().__init__(boxes, problem)
+    Attributes:
+        boxes: their numbers.
+        problem: of the first of them.
+        misplaced: whether their places are the problem, and not an edge or an id.
+    """
+
+    def __init__(
+        self, boxes: Sequence[int] | np.ndarray, problem: str, misplaced: bool = True
+    ) -> None:
+        super().__init__(boxes, problem, misplaced)
         self.boxes, self.problem = [int(box) for box in boxes], problem
+        self.misplaced = misplaced
 
     def __str__(self) -> str:
         return f"{'box' if len(self.boxes) == 1 else 'boxes'} {self.boxes}: {self.problem}"
@@ -128,12 +137,13 @@ class Load:
             checks.shaped("ids", labels["ids"], (count,))
             _, which, times = np.unique(labels["ids"], return_inverse=True, return_counts=True)
             if (repeated := np.flatnonzero(times[which] > 1)).size:
-                raise BoxError(repeated, "the same id; expected one for each box")
+                raise BoxError(repeated, "the same id; expected one for each box", misplaced=False)
 
         # Where there are no thin boxes and none outside, _find_contacts finds those that overlap.
         thin = np.flatnonzero(sizes.min(axis=1) < _SMALLEST_EDGE)
         if thin.size:
-            raise BoxError(thin, f"edges of {sizes[thin[0]]} m; expected >= {_SMALLEST_EDGE} m")
+            found = f"edges of {sizes[thin[0]]} m; expected >= {_SMALLEST_EDGE} m"
+            raise BoxError(thin, found, misplaced=False)
         beyond = (low < -OVERLAP) | (high > container + OVERLAP)
         outside = np.flatnonzero(beyond.any(axis=1))
         if outside.size:

@@ -74,7 +74,7 @@ def build_load(variants: np.ndarray) -> Load:
     variants = checks.integer_array("variants", variants, (None, None, len(COLUMNS)), 2)
     if not variants.size:
         raise ValueError(f"variants has shape {variants.shape}; expected a wall and a row at least")
-    counts, cells = (table[np.arange(len(COLUMNS)), variants] for table in (_COUNTS, _CELLS))
+    counts, cells = (known[np.arange(len(COLUMNS)), variants] for known in (_COUNTS, _CELLS))
     filled = np.arange(cells.shape[3]) < counts[..., np.newaxis]
     walls, rows, _, _ = np.nonzero(filled)
     packages, left, low = cells[filled].T

@@ -26,10 +26,10 @@ def reachable(load: Load, present: np.ndarray) -> tuple[np.ndarray, ...]:
     Returns:
         Keys, (n,) each, the most important one first: the box with the largest ones is picked.
     """
-    return ~load.covered(present), ~load.behind(present), *_places(load)
+    return ~load.covered(present), ~load.behind(present), *_front_and_top(load)
 
 
-def _places(load: Load) -> np.ndarray:
+def _front_and_top(load: Load) -> np.ndarray:
     """The front and the top of each box, (2, n) float64."""
     # Rounded, so that equal places are equal, however they were computed.
     return np.rint((load.positions + load.sizes / 2)[:, [0, 2]].T / OVERLAP)
@@ -109,7 +109,7 @@ def _reachable_first(load: Load, stops: np.ndarray | None) -> np.ndarray:
     The same as by asking the rule before each pick. But what a rule prefers among the boxes that
     can be reached does not change, and a pick frees only those that waited for this very box.
     """
-    keys = [*-_places(load)[::-1]]
+    keys = [*-_front_and_top(load)[::-1]]
     by_preference = np.lexsort(keys if stops is None else [*keys, _due(load, stops)])
     preference = np.argsort(by_preference).tolist()
 
@@ -123,7 +123,9 @@ def _reachable_first(load: Load, stops: np.ndarray | None) -> np.ndarray:
     def key(box: int) -> tuple[bool, bool, int]:
         return bool(waits[0][box]), bool(waits[1][box]), preference[box]
 
-    # A box that has become free is pushed again, with a smaller key; its older entries come later.
+    # Blocked boxes are in the heap, too, behind all free ones: where boxes wait for each other in a
+    # circle none is free, and the rule picks a blocked one. A box that has become free is pushed
+    # again, with a smaller key; by the time of its older entry it is gone.
     heap, present, order = [*map(key, range(len(load)))], np.ones(len(load), bool), []
     heapify(heap)
     while heap:

@@ -135,23 +135,22 @@ def read_load(
         argument = "container" if outside.max() > LARGEST_TOLERANCE else "tolerance"
         if outside.max() > 2 * container.max():  # so far outside that the unit must be wrong
             argument = "units"
-        problem, said = error.problem, error.problem.startswith(("reaches", "overlap", "floats"))
+        problem = error.problem
         if place is CENTRE and argument != "units" and centres[:, 2].min() <= tolerance:
             corners = ", ".join(f"{names[c]}={corner}" for c, corner in zip(CENTRE, CORNER))
             problem, argument = (
                 f"{problem}; if these are no centres but corners: {corners}",
                 "columns",
             )
-        refuse(np.array(error.boxes), problem, argument if said else None)
+        refuse(np.array(error.boxes), problem, argument if error.misplaced else None)
     if (tipping := uncarried(load)).size:
         refuse(tipping, "tips, because nothing carries its centre of mass", "tolerance")
-    for changes, what in ((moves, "moved by"), (smaller, "taken for smaller, by")):
-        if changes.any():
-            count, most = changes.any(axis=1).sum(), 1000 * np.linalg.norm(changes, axis=1).max()
+    for edits, what in ((moves, "moved by"), (smaller, "taken for smaller, by")):
+        if edits.any():
+            count, most = edits.any(axis=1).sum(), 1000 * np.linalg.norm(edits, axis=1).max()
             LOGGER.warning("%d of %d boxes %s up to %.1f mm", count, len(load), what, most)
-    if (
-        moves.any() or smaller.any()
-    ):  # each edge of two boxes may be elsewhere by its fault and what mended it
+    if moves.any() or smaller.any():
+        # Each edge of two boxes may be elsewhere, by its fault and by what mended it.
         hidden = 2000 * (tolerance + np.abs(moves).max() + smaller.max() / 2)
         LOGGER.warning("An order may overlook overlaps of up to %.0f mm", hidden)
     return load

@@ -144,14 +144,14 @@ def _excel(content: bytes) -> Iterable[list[str]]:
         from openpyxl import load_workbook
     # Pictures are left out; what remains is as long as the archive says, or damaged.
     copy, instead = BytesIO(), "; save it as CSV"
-    with ZipFile(BytesIO(content)) as parts, ZipFile(copy, "w") as kept:
+    with ZipFile(BytesIO(content)) as parts, ZipFile(copy, "w") as reduced:
         _check("parts", len(parts.infolist()), instead)
         xml = [part for part in parts.infolist() if part.filename.endswith((".xml", ".rels"))]
         styles = [part.file_size for part in xml if part.filename == "xl/styles.xml"]
         _check("bytes of styles", sum(styles), instead)
         _check("bytes of XML", sum(part.file_size for part in xml), instead)
         for part in xml:
-            kept.writestr(part.filename, parts.read(part))
+            reduced.writestr(part.filename, parts.read(part))
     sheet = load_workbook(copy, read_only=True, data_only=True, keep_links=False).worksheets[0]
     sheet.reset_dimensions()  # what a file says of its sheet's size may be wrong
     return ([*map(_text, line)] for line in sheet.iter_rows(values_only=True))

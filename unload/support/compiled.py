@@ -33,8 +33,8 @@ def compiled(function: Callable | None = None, plain: bool = False, **options) -
     at their first call, in a fresh installation for ten seconds in all; this is logged once, when
     the folder is made. Where none can be written, compiled code is kept in memory, with a warning.
 
-    A ``plain`` function runs in Python until something imports numba: an order of picks calls it
-    too seldom to be worth compiling.
+    A ``plain`` function runs in Python until another one, or one that calls it, is compiled in this
+    process: an order of picks, which needs no other, calls it too seldom to be worth compiling.
     """
     if function is None:
         return partial(compiled, plain=plain, **options)  # type: ignore[return-value]
@@ -44,12 +44,14 @@ def compiled(function: Callable | None = None, plain: bool = False, **options) -
 class Compiled:
     """A function that is compiled when it is first called, or used by one that is compiled."""
 
+    any_compiled = False  # of all these functions, in this process
+
     def __init__(self, function: Callable, plain: bool, options: dict) -> None:
         update_wrapper(self, function)
         self._function, self._plain, self._options = function, plain, options
 
     def __call__(self, *given):
-        if self._plain and "numba" not in sys.modules:
+        if self._plain and not Compiled.any_compiled:
             with np.errstate(over="ignore"):  # integers wrap, as compiled ones do
                 return self._function(*given)
         return self.dispatcher(*given)
@@ -57,11 +59,12 @@ class Compiled:
     @cached_property
     def dispatcher(self) -> Any:
         """The function as numba has compiled it."""
-        njit, config, place = _numba().njit, _numba().config, _folder()
-        if place is None:
+        Compiled.any_compiled = True
+        njit, config, folder = _numba().njit, _numba().config, _folder()
+        if folder is None:
             return njit(**self._options)(self._function)
         # numba reads this setting when it is told to cache a function; then it is the user's again.
-        before, config.CACHE_DIR = config.CACHE_DIR, str(place)
+        before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
         try:
             return njit(cache=True, **self._options)(self._function)
         finally:
