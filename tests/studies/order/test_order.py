@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import partial
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -43,6 +44,17 @@ def test_the_index_is_what_sorting_returns():
     assert np.array_equal(np.take_along_axis(ranks, index, axis=1), rows)  # they are inverse
     assert (ranks != index).any()
     assert np.array_equal(sorted_index(seen), sorted_index(equalize(seen)))
+
+
+def test_a_corner_of_fig_6_tells_index_and_rank_apart():
+    """As notebook 02 and report 1 say."""
+    envs = gymnasium.make_vec("unload/Container-v0", 64)
+    seen, _ = envs.reset(seed=0)
+    counts = {}
+    for name, values in {"rank": equalize(seen), "index": sorted_index(seen)}.items():
+        in_corner = (values[..., [0, 2]] < -0.5).all(axis=-1).sum(axis=-1)
+        counts[name] = int(in_corner.min()), int(in_corner.max())
+    assert counts == {"rank": (0, 5), "index": (7, 19)}
 
 
 def test_other_rows_give_another_index():
