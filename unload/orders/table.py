@@ -132,10 +132,17 @@ def _csv(content: bytes, header: int) -> Iterable[list[str]]:
         if line.count(mark) >= _COLUMNS - 1:
             separator = mark
             break
-    lines = csv.reader(StringIO(text, newline=None), delimiter=separator, skipinitialspace=True)
-    if separator == ",":
-        return lines
-    return ([re.sub(r"^(-?\d+),(\d+)$", r"\1.\2", cell.strip()) for cell in line] for line in lines)
+    for number, line in enumerate(StringIO(text, newline=None), 1):
+        # Each line by itself: a quotation mark that is not closed would take in those below.
+        reader = csv.reader([line], delimiter=separator, skipinitialspace=True, strict=True)
+        try:
+            cells = next(reader) if number >= header else []
+        except csv.Error as error:
+            wanted = "expected a cell that begins with a quotation mark to end with one there"
+            raise ListError(f"line {number} is no line of CSV: {error}; {wanted}") from error
+        if separator != ",":
+            cells = [re.sub(r"^(-?\d+),(\d+)$", r"\1.\2", cell.strip()) for cell in cells]
+        yield cells
 
 
 def _excel(content: bytes) -> Iterable[list[str]]:
