@@ -160,6 +160,19 @@ def test_what_is_no_excel_file_and_one_that_ends_early_are_refused(book):
             read_table(path)
 
 
+def test_a_hidden_sheet_is_passed_over(book, tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    own = openpyxl.load_workbook(book())
+    for state in ("hidden", "veryHidden"):
+        old = own.create_sheet(state, 0)
+        old.append(NAMES.split(","))
+        old.append([1] * 7)
+        old.sheet_state = state
+    own.active = 2
+    own.save(tmp_path / "hidden.xlsx")
+    assert read_table(tmp_path / "hidden.xlsx").to_numpy().tolist() == [BOX.split(",")]
+
+
 def test_the_first_sheet_may_be_a_chart(book, tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     own = openpyxl.load_workbook(book())

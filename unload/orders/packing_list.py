@@ -56,7 +56,7 @@ def read_load(
 
     Args:
         path: of a CSV file (UTF-8; separated by commas, or by semicolons or tabs, where decimals
-            may have a comma) or of an Excel file (``.xlsx``, first sheet); or a
+            may have a comma) or of an Excel file (``.xlsx``, first visible sheet); or a
             ``pandas.DataFrame``, for a list that has to be read otherwise. At most 3,000 rows and
             200 columns, see ``unload.orders.table.LIMITS``.
         units: of lengths whose names say none: ``"m"``, ``"cm"``, ``"mm"`` or ``"in"``.

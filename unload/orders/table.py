@@ -146,7 +146,7 @@ def _csv(content: bytes, header: int) -> Iterable[list[str]]:
 
 
 def _excel(content: bytes) -> Iterable[list[str]]:
-    """The cells of each line of the first sheet of cells."""
+    """The cells of each line of the first sheet of cells that is not hidden."""
     with checks.needed_for("an Excel file"):
         from openpyxl import load_workbook
     # Pictures are left out; what remains is as long as the archive says, or damaged.
@@ -159,7 +159,8 @@ def _excel(content: bytes) -> Iterable[list[str]]:
         _check("bytes of XML", sum(part.file_size for part in xml), instead)
         for part in xml:
             reduced.writestr(part.filename, parts.read(part))
-    sheet = load_workbook(copy, read_only=True, data_only=True, keep_links=False).worksheets[0]
+    book = load_workbook(copy, read_only=True, data_only=True, keep_links=False)
+    sheet = [each for each in book.worksheets if each.sheet_state == "visible"][0]
     sheet.reset_dimensions()  # what a file says of its sheet's size may be wrong
     return ([*map(_text, line)] for line in sheet.iter_rows(values_only=True))
 
