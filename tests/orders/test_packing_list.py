@@ -151,14 +151,18 @@ def test_a_paper_s_load_with_3_mm_of_noise_is_read(rng):
 
 def test_other_columns_are_kept(written):
     """As numbers where all cells are written as numbers; a weight is one of them."""
-    columns = f"stop,code,note,name,{CORNERS},id,weight_kg,yaw,pitch"
-    lines = "2,07,,B,6,0.1,0,0.5,0.4,0.3,a,25,90,0", "1,11,top,C,6,0.1,0.3,0.5,0.4,0.2,b,1.5,-90,0"
+    columns = f"stop,code,parcel,note,name,{CORNERS},id,weight_kg,yaw,pitch"
+    lines = (
+        "2,07,3401234500000017,,B,6,0.1,0,0.5,0.4,0.3,a,25,90,0",
+        "1,11,1.5,top,C,6,0.1,0.3,0.5,0.4,0.2,b,123456789.012345,-90,0",
+    )
     load = read_load(written(*lines, columns=columns))
     assert load.ids.tolist() == ["a", "b"]
     kept = {name: values.tolist() for name, values in load.extras.items()}
     assert kept == {
-        "stop": [2, 1], "code": ["07", "11"], "note": ["", "top"], "name": ["B", "C"],
-        "weight_kg": [25, 1.5], "yaw": [90, -90], "pitch": [0, 0],
+        "stop": [2, 1], "code": ["07", "11"], "parcel": ["3401234500000017", "1.5"],
+        "note": ["", "top"], "name": ["B", "C"],
+        "weight_kg": [25, 123456789.012345], "yaw": [90, -90], "pitch": [0, 0],
     }  # fmt: skip
 
 

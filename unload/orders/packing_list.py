@@ -25,7 +25,8 @@ ROTATIONS = ("rotation", "yaw", "pitch", "roll")
 COLUMN_NAMES = {name: name for name in (*CENTRE, *CORNER, *SIZES, *ROTATIONS, "id")}
 COLUMN_NAMES |= zip(("pos_x", "pos_y", "pos_z", "length", "width", "height"), CORNER + SIZES)
 LARGEST_NUMBER = 1e6  # a length in mm is smaller
-NUMBER_PATTERN = r"-?(0|[1-9]\d*)(\.\d+)?"  # no code with zeros in front
+# No code with zeros in front, nor one of more digits than a float64 holds.
+NUMBER_PATTERN = r"-?(?=(\.?\d){1,15}$)(0|[1-9]\d*)(\.\d+)?"
 
 
 def read_load(
