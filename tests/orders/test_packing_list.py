@@ -32,6 +32,16 @@ def test_ids_stay_as_they_are_written_and_are_else_the_rows(written):
     assert read_load(written(*rows, columns=CORNERS)).ids.tolist() == ids
 
 
+def test_a_box_without_an_id_is_refused(written):
+    """As from merged cells, of which the first alone holds what is seen."""
+    with pytest.raises(ListError, match=r"^row 2 \(id ''\): id is empty; expected one for each"):
+        read_load(written(STACK[0], STACK[1].replace("b", " ", 1)))
+    table = pd.read_csv(written(*STACK))
+    for missing in (None, np.nan, pd.NaT):
+        with pytest.raises(ListError, match=r"^row 1 \(.*: id is empty; expected one for each"):
+            read_load(table.assign(id=[missing, "b"]))
+
+
 def assert_same(one: Load, other: Load) -> None:
     for name in ("positions", "sizes", "packages", "walls", "container"):
         assert getattr(one, name) == pytest.approx(getattr(other, name), abs=1e-12)

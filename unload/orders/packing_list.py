@@ -47,7 +47,7 @@ def read_load(
       to the origin; or ``x``, ``y``, ``z``: its centre;
     - ``size_x``, ``size_y``, ``size_z`` or ``length``, ``width``, ``height``: edges along the axes
       as the box stands, at least 2 mm;
-    - ``id``: the number of the row if missing;
+    - ``id``: the number of the row if there is no such column;
     - ``rotation``, ``yaw``, ``pitch`` or ``roll``, in degrees: quarter turns only, because sizes
       are those after the turns.
 
@@ -96,6 +96,9 @@ def read_load(
         shown = ", ".join(f"row {row + 1} (id {str(ids[row])!r})" for row in rows[:5])
         more = f" and {len(rows) - 5} more" if len(rows) > 5 else ""
         raise ListError(f"{shown}{more}: {problem}", argument)
+
+    if "id" in names and (missing := np.flatnonzero(table[names["id"]].isna() | (ids == ""))).size:
+        refuse(missing, f"{names['id']} is empty; expected one for each box")
 
     def numbers(meaning: str) -> np.ndarray:
         name = names[meaning]
