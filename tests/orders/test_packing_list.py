@@ -87,6 +87,23 @@ def test_the_units_of_names_come_before_those_of_the_argument(written):
     assert load.positions[0] == pytest.approx([6.25, 0.3, 0.15])
 
 
+@pytest.mark.parametrize("mark", [",", "."])
+def test_what_may_be_thousands_or_decimals_of_mm_is_refused(written, mark):
+    """1.200 was once 1.2 mm, and the order that of another load. In m it is clear."""
+
+    def read(*lines: str, units: str = "mm") -> Load:
+        path = written(*(line.replace(".", mark) for line in lines), columns=columns)
+        return read_load(path, units)
+
+    columns = f"id,{CORNERS}".replace(",", ";")
+    lines = "a;0;600;0;600;400;300", "b;0;1.200;0;600;400;300.5"
+    with pytest.raises(ListError, match=r"^row 2 \(id 'b'\): '1.200' in mm may have thousands or"):
+        read(*lines)
+    for clear in ("c;1000.125;0;0;600;400;300", "c;1000;0.0;0;600;400;300"):
+        assert read(*lines, clear).positions[1, 1] == pytest.approx(0.2012)
+    assert read("b;0;1.200;0;1;1;1", units="m").positions[0, 1] == 1.7
+
+
 def test_a_table_is_a_list_too(written):
     table = pd.read_csv(written(*STACK), index_col=None).set_index(pd.Index([5, 7]))
     assert_same(read_load(table), read_load(written(*STACK)))

@@ -51,9 +51,11 @@ def read_load(
     - ``rotation``, ``yaw``, ``pitch`` or ``roll``, in degrees: quarter turns only, because sizes
       are those after the turns.
 
-    A length's name may end in its unit: ``length_mm``, ``x (cm)``. All other columns, such as a
-    stop or a weight, become ``Load.extras``. Each line is one box; quantities are ignored. In a
-    file, columns without a name are left out.
+    A length's name may end in its unit: ``length_mm``, ``x (cm)``. In mm, a number such as 1.200 is
+    refused unless another one shows that its mark is of decimals, as 0.000 and 1200.5 do.
+
+    All other columns, such as a stop or a weight, become ``Load.extras``. Each line is one box;
+    quantities are ignored. In a file, columns without a name are left out.
 
     Args:
         path: of a CSV file (UTF-8; separated by commas, or by semicolons or tabs, where decimals
@@ -113,9 +115,17 @@ def read_load(
         if (turned := np.flatnonzero(np.abs((numbers(turn) + 45) % 90 - 45) > 1e-3)).size:
             refuse(turned, f"a {names[turn]} that is no quarter turn; expected one")
 
-    # Lengths in m, and x from the rear.
     place = CENTRE if {*CENTRE} <= {*names} else CORNER
     read = (*place, *SIZES, "id")
+    # In mm, 1.200 has thousands or decimals; a number such as 0.000 or 1200.000 says which.
+    in_mm = table[[names[n] for n in read[:6] if (_split_unit(names[n])[1] or units) == "mm"]]
+    texts = [cell for cell in in_mm.to_numpy().ravel() if isinstance(cell, str)]
+    unclear = [cell for cell in texts if re.fullmatch(r"-?[1-9]\d{0,2}\.\d{3}", cell)]
+    if unclear and not any(re.match(r"-?(0|\d{4,})\.", cell) for cell in texts):
+        found = f"{unclear[0]!r} in mm may have thousands or decimals"
+        refuse(np.flatnonzero(in_mm.isin(unclear).any(axis=1)), f"{found}; expected 1200 or 1.2")
+
+    # Lengths in m, and x from the rear.
     lengths = [numbers(name) / UNITS[_split_unit(names[name])[1] or units] for name in read[:6]]
     centres, sizes = np.hsplit(np.stack(lengths, axis=1), 2)
     centres = centres if place is CENTRE else centres + sizes / 2
