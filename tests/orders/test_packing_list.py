@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from unload import Load, read_load, stack_load
+from unload import Load, picking_order, read_load, stack_load
 from unload.load.boxes import _SMALLEST_EDGE
 from unload.orders.packing_list import ListError
 
@@ -257,6 +257,22 @@ def test_columns_are_refused_by_their_names(written):
         cells = ",".join("1" for _ in columns.split(","))
         with pytest.raises(ValueError, match=message):
             read_load(written(cells, columns=columns))
+
+
+def test_a_sentence_holds_no_more_names_than_one_reads(written):
+    """Of a list with many columns, which have long ones."""
+    long = ",".join(f"{number:0900}" for number in range(190))
+    whole, row = f"{CORNERS},{long}", "1,1,0" + 193 * ",1"
+    for columns, lines, arguments in (
+        (whole, [], {}),
+        (f"id,{long}", ["1"], {}),
+        (f"{whole},note,note", [row], {}),
+        (whole, [row], {"columns": {"Länge": "size_x"}}),
+    ):
+        with pytest.raises(ValueError, match="^.{1000,1200}$"):
+            read_load(written(*lines, columns=columns), **arguments)
+    with pytest.raises(ValueError, match="^.{1000,1200}$"):
+        picking_order(read_load(written(row, columns=whole)), "stop")
 
 
 def test_a_row_that_is_too_long_becomes_smaller(written, caplog):

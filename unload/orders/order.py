@@ -163,7 +163,7 @@ def _stops(load: Load, by: str) -> np.ndarray:
     asked = by[1:] if falling else by
     if (name := named.get(asked, named.get(asked.lower()))) is None:
         known = ", ".join(load.extras) or "it has none"
-        raise ValueError(f"by is {by!r}; expected one of the list's other columns: {known}")
+        raise ValueError(f"by is {by!r}; expected one of the list's other columns: {known:.1000}")
     cells = pd.Series(load.extras[name])
     # A date is a number, too, and so is a missing one.
     stops = pd.to_numeric(cells, errors="coerce").where(cells.notna()).to_numpy(float)

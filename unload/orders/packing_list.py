@@ -179,13 +179,13 @@ def _columns_by_meaning(names: list, columns: Mapping[str, str]) -> dict[str, st
     for name in names:
         meaning = COLUMN_NAMES.get(columns.get(name) or _split_unit(name)[0], name)
         if meaning in by_meaning:
-            raise ListError(f"the list has the columns {names}; expected one {meaning!r}")
+            raise ListError(f"the list has the columns {names!s:.1000}; expected one {meaning!r}")
         by_meaning[meaning] = name
     missing = ", ".join(name for name in SIZES if name not in by_meaning)
     if ({*CENTRE} <= {*by_meaning}) == ({*CORNER} <= {*by_meaning}):
         missing = "either x, y, z or x_min, y_min, z_min"
     if missing:
-        raise ListError(f"the list has the columns {names}; expected {missing}", "columns")
+        raise ListError(f"the list has the columns {names!s:.1000}; expected {missing}", "columns")
     return by_meaning
 
 

@@ -77,7 +77,7 @@ def read_table(path: str | Path | pd.DataFrame, header: int = 1) -> pd.DataFrame
     _check("columns", table.shape[1])
     _check("rows", len(table))
     if not len(table):
-        raise ListError(f"the list has the columns {[*table]} and no row; expected boxes")
+        raise ListError(f"the list has the columns {[*table]!s:.1000} and no row; expected boxes")
     return table
 
 
