@@ -73,6 +73,7 @@ def python(*arguments: str, without: tuple = (), **options):
     environment = {name: os.environ[name] for name in os.environ if name.upper() not in without}
     # Its text is UTF-8, on Windows, too.
     environment["PYTHONUTF8"] = "1"
+    options["close_fds"] = False  # it holds the lock, too, see ``alone``
     return subprocess.run([str(PYTHON), *arguments], cwd=ROOT, env=environment, **options)
 
 
@@ -155,7 +156,8 @@ def describe_python() -> str:
 def alone():
     """Let one make.py at a time look after ``.venv``, and only after a folder of its own making.
 
-    The system ends the lock with the process, however that ends.
+    The system ends the lock with the process, however that ends; but where a pip that it has
+    started goes on without it, not before this ends (on Windows with the process itself).
     """
     there = VENV.exists() and (not VENV.is_dir() or any(VENV.iterdir()))
     if VENV.is_symlink() or there and not MARK.exists():
@@ -167,6 +169,7 @@ def alone():
         VENV.mkdir(exist_ok=True)
         MARK.touch()
     with MARK.open("rb") as file:
+        os.set_inheritable(file.fileno(), True)
         if not lock(file):
             print(f"Another make.py is at work on {VENV}; waiting for it")
             while not lock(file):

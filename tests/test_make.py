@@ -192,6 +192,21 @@ def test_a_second_one_waits_until_the_first_is_done(made, set_in, capfd):
     assert said == f"Another make.py is at work on {make.VENV}; waiting for it\n"
 
 
+@pytest.mark.needs("fork")
+def test_a_pip_that_goes_on_alone_keeps_a_second_one_waiting(made):
+    """As where only its make.py was ended; two at once would install into one environment."""
+    make.main("ready")
+    goes_on, ends = os.pipe()
+    with make.alone():
+        make.python("-c", "import os; os.fork() or os.read(0, 1)", stdin=goes_on)
+    with make.MARK.open("rb") as file:
+        assert not make.lock(file)
+        os.close(ends)
+        while not make.lock(file):
+            make.time.sleep(0.01)
+    os.close(goes_on)
+
+
 def test_without_ensurepip_the_package_to_install_is_named(made, set_in):
     error = subprocess.CalledProcessError(1, "python", b"No module named ensurepip")
     set_in(make.venv, create=Mock(side_effect=error))

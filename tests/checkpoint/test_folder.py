@@ -26,7 +26,8 @@ def test_a_killed_run_goes_on_with_the_same_bits(tmp_path):
     for picks in (60, 160):  # before the memory is full, and after that
         kill_run(config, tmp_path / "killed", picks)
         assert (tmp_path / "killed" / "checkpoint.npz").exists()
-    (tmp_path / "killed" / "checkpoint.npz.partial").write_bytes(b"half")
+        (tmp_path / "killed" / f"checkpoint.npz.{picks}.partial").write_bytes(b"half")
+    assert not (tmp_path / "killed" / "checkpoint.npz.60.partial").exists()
     train(config, tmp_path / "killed", progress=False, stack=few_walls, same_code=True)
     assert_same(tmp_path / "straight", tmp_path / "killed")
     assert not [*(tmp_path / "killed").glob("checkpoint*")]

@@ -138,6 +138,46 @@ def test_names_of_any_language_are_written_to_any_console_and_drawn_without_a_di
     assert (tmp_path / "order.png").stat().st_size > 1_000
 
 
+@pytest.mark.skipif(os.name != "posix", reason="a shell closes what a program has open")
+@pytest.mark.parametrize(
+    ("closed", "code", "printed", "said"),
+    [
+        (">&-", 1, "", "the standard output is closed; expected it open, or --output\n"),
+        ("2>&-", 0, "pick,id,item,covered,behind\n1,a,0,False,False\n", ""),
+    ],
+)
+def test_what_is_closed_is_not_written_to(tmp_path, closed, code, printed, said):
+    """The summary once stood in the order instead."""
+    (tmp_path / "boxes.csv").write_text(STACK, encoding="utf-8")
+    program = f"{sys.executable} -m unload boxes.csv --picture drawn.png {closed}"
+    options = {"cwd": tmp_path, "env": os.environ | {"PYTHONPATH": str(ROOT)}}
+    done = subprocess.run(program, shell=True, capture_output=True, text=True, **options)
+    assert (done.returncode, done.stdout, done.stderr) == (code, printed, said)
+    assert (tmp_path / "drawn.png").exists() == (code == 0)
+
+
+@pytest.mark.parametrize("module", ["unload.orders.command", "pandas"])
+def test_ctrl_c_ends_it_without_a_word(tmp_path, run_python, module):
+    """Also while it imports, which takes most of its time."""
+    program = f"""if True:
+        import sys
+        from unload.__main__ import command
+
+        class Interrupted:
+            def find_spec(self, name, *others):
+                if name == {module!r}:
+                    raise KeyboardInterrupt
+
+        sys.meta_path.insert(0, Interrupted())
+        sys.argv[1:] = []
+        try:
+            command()
+        except SystemExit as end:
+            print(end.code)
+    """
+    assert run_python(program, tmp_path, PYTHONPATH=str(ROOT)) == ("130\n", "")
+
+
 @pytest.mark.needs("SIGPIPE")
 def test_nothing_is_imported_before_it_is_needed(tmp_path, run_python):
     """An order takes pandas, but compiles nothing; help takes neither.

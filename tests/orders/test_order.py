@@ -4,6 +4,7 @@ import inspect
 import textwrap
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from tests.load.walls import KINDS, of_corners, own_load
@@ -158,7 +159,10 @@ def test_the_rule_in_the_docstring_works(small_load):
         present[item] = False
 
 
-@pytest.mark.parametrize("stops", [["1", "", "B"], [1, None, np.inf]])
+DATES = [pd.Timestamp(2026, 1, 2), pd.NaT, pd.NaT]
+
+
+@pytest.mark.parametrize("stops", [["1", "", "B"], [1, None, np.inf], DATES])
 def test_boxes_without_the_number_of_a_stop_are_counted_and_the_first_is_named(boxes, stops):
     load = boxes((0.3, 0.2), (0.8, 0.2), (1.3, 0.2))
     load = Load(load.positions, load.sizes, ids=list("abc"), extras={"stop": stops})

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from unload import Load, read_load
+from unload import Load, picking_order, read_load
 from unload.load.boxes import _SMALLEST_EDGE
 from unload.orders.packing_list import ListError
 
@@ -30,6 +30,16 @@ def test_ids_stay_as_they_are_written_and_are_else_the_rows(written):
         lines = [f"{name},{row}" for name, row in zip(ids, rows)]
         assert read_load(written(*lines)).ids.tolist() == ids
     assert read_load(written(*rows, columns=CORNERS)).ids.tolist() == ids
+
+
+def test_a_box_without_an_id_is_refused(written):
+    """As from merged cells, of which the first alone holds what is seen."""
+    with pytest.raises(ListError, match=r"^row 2 \(id ''\): id is empty; expected one for each"):
+        read_load(written(STACK[0], STACK[1].replace("b", " ", 1)))
+    table = pd.read_csv(written(*STACK))
+    for missing in (None, np.nan, pd.NaT):
+        with pytest.raises(ListError, match=r"^row 1 \(.*: id is empty; expected one for each"):
+            read_load(table.assign(id=[missing, "b"]))
 
 
 def assert_same(one: Load, other: Load) -> None:
@@ -68,6 +78,23 @@ def test_names_and_units(written, columns, factor, arguments):
     numbers = (cells.iloc[:, 1:].astype(float) * factor).map(repr)
     lines = pd.concat([cells[0], numbers], axis=1).agg(",".join, axis=1)
     assert_same(read_load(written(*lines, columns=columns), **arguments), expected)
+
+
+@pytest.mark.parametrize("mark", [",", "."])
+def test_what_may_be_thousands_or_decimals_of_mm_is_refused(written, mark):
+    """1.200 was once 1.2 mm, and the order that of another load. In m it is clear."""
+
+    def read(*lines: str, units: str = "mm") -> Load:
+        path = written(*(line.replace(".", mark) for line in lines), columns=columns)
+        return read_load(path, units)
+
+    columns = f"id,{CORNERS}".replace(",", ";")
+    lines = "a;0;600;0;600;400;300", "b;0;1.200;0;600;400;300.5"
+    with pytest.raises(ListError, match=r"^row 2 \(id 'b'\): '1.200' in mm may have thousands or"):
+        read(*lines)
+    for clear in ("c;1000.125;0;0;600;400;300", "c;1000;0.0;0;600;400;300"):
+        assert read(*lines, clear).positions[1, 1] == pytest.approx(0.2012)
+    assert read("b;0;1.200;0;1;1;1", units="m").positions[0, 1] == 1.7
 
 
 def test_a_table_is_a_list_too(written):
@@ -139,14 +166,18 @@ def test_small_faults_are_settled_and_logged(written, caplog):
 
 def test_other_columns_are_kept(written):
     """As numbers where all cells are written as numbers; a weight is one of them."""
-    columns = f"stop,code,note,name,{CORNERS},id,weight_kg,yaw,pitch"
-    lines = "2,07,,B,6,0.1,0,0.5,0.4,0.3,a,25,90,0", "1,11,top,C,6,0.1,0.3,0.5,0.4,0.2,b,1.5,-90,0"
+    columns = f"stop,code,parcel,note,name,{CORNERS},id,weight_kg,yaw,pitch"
+    lines = (
+        "2,07,3401234500000017,,B,6,0.1,0,0.5,0.4,0.3,a,25,90,0",
+        "1,11,1.5,top,C,6,0.1,0.3,0.5,0.4,0.2,b,123456789.012345,-90,0",
+    )
     load = read_load(written(*lines, columns=columns))
     assert load.ids.tolist() == ["a", "b"]
     kept = {name: values.tolist() for name, values in load.extras.items()}
     assert kept == {
-        "stop": [2, 1], "code": ["07", "11"], "note": ["", "top"], "name": ["B", "C"],
-        "weight_kg": [25, 1.5], "yaw": [90, -90], "pitch": [0, 0],
+        "stop": [2, 1], "code": ["07", "11"], "parcel": ["3401234500000017", "1.5"],
+        "note": ["", "top"], "name": ["B", "C"],
+        "weight_kg": [25, 123456789.012345], "yaw": [90, -90], "pitch": [0, 0],
     }  # fmt: skip
 
 
@@ -214,6 +245,22 @@ def test_columns_are_refused_by_their_names(written):
         cells = ",".join("1" for _ in columns.split(","))
         with pytest.raises(ValueError, match=message):
             read_load(written(cells, columns=columns))
+
+
+def test_a_sentence_holds_no_more_names_than_one_reads(written):
+    """Of a list with many columns, which have long ones."""
+    long = ",".join(f"{number:0900}" for number in range(190))
+    whole, row = f"{CORNERS},{long}", "1,1,0" + 193 * ",1"
+    for columns, lines, arguments in (
+        (whole, [], {}),
+        (f"id,{long}", ["1"], {}),
+        (f"{whole},note,note", [row], {}),
+        (whole, [row], {"columns": {"Länge": "size_x"}}),
+    ):
+        with pytest.raises(ValueError, match="^.{1000,1200}$"):
+            read_load(written(*lines, columns=columns), **arguments)
+    with pytest.raises(ValueError, match="^.{1000,1200}$"):
+        picking_order(read_load(written(row, columns=whole)), "stop")
 
 
 def test_a_row_that_is_too_long_becomes_smaller(written, caplog):

@@ -97,6 +97,16 @@ def test_a_line_with_more_cells_than_names_is_refused(read):
     assert read(f'{NAMES}, note\n{BOX}, "1,5"\n')["note"].tolist() == ["1,5"]
 
 
+@pytest.mark.parametrize("below", ["", 'b,5,0,1,0,0.5,0.4,12"', 'b,5,0,1,0,0.5,0.4,"12in'])
+def test_a_cell_ends_in_its_line(read, below):
+    """A quotation mark that was never closed once took in the boxes up to the next one."""
+    text = f'The "old" truck\n"7\n{NAMES},note\n{BOX},"12in\n{BOX},5" pipe\n{below}'
+    with pytest.raises(ListError, match="^line 4 is no line of CSV: .* expected a cell that"):
+        read(text, header=3)
+    cells = read(text.replace(',"12in', ',"12"" in, old"'), header=3)["note"]
+    assert cells.tolist()[:2] == ['12" in, old', '5" pipe']
+
+
 @pytest.mark.parametrize("encoding", ["cp1252", "utf-16"])
 def test_another_encoding_is_refused_with_how_to_save(read, encoding):
     with pytest.raises(ListError, match=r'codec can\'t decode .*; save it as .*"CSV UTF-8"'):
@@ -148,6 +158,19 @@ def test_what_is_no_excel_file_and_one_that_ends_early_are_refused(book):
         path.write_bytes(damaged)
         with pytest.raises(ListError, match="boxes.xlsx is not a readable list"):
             read_table(path)
+
+
+def test_a_hidden_sheet_is_passed_over(book, tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    own = openpyxl.load_workbook(book())
+    for state in ("hidden", "veryHidden"):
+        old = own.create_sheet(state, 0)
+        old.append(NAMES.split(","))
+        old.append([1] * 7)
+        old.sheet_state = state
+    own.active = 2
+    own.save(tmp_path / "hidden.xlsx")
+    assert read_table(tmp_path / "hidden.xlsx").to_numpy().tolist() == [BOX.split(",")]
 
 
 def test_the_first_sheet_may_be_a_chart(book, tmp_path):

@@ -40,6 +40,31 @@ def test_what_is_no_file_of_plain_arrays_is_neither_read_nor_written(tmp_path):
         files.read_arrays(path)
 
 
+def test_a_writer_touches_no_other_file(tmp_path):
+    """Nor another writer: several write one file, and the last one's is whole."""
+    (tmp_path / "a.partial").write_bytes(b"of somebody else")
+
+    def interrupted(file):
+        file.write(b"half")
+        files.write_text(tmp_path / "a", "whole")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        files.write_atomically(tmp_path / "a", interrupted)
+    held = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert held == {"a": b"whole", "a.partial": b"of somebody else"}
+
+
+@pytest.mark.needs("symlinks")
+def test_what_a_link_points_to_is_written(tmp_path):
+    link, target = tmp_path / "link", tmp_path / "folder" / "target"
+    link.symlink_to(target)
+    for text in ("new", "again"):
+        files.write_text(link, text)
+        assert link.is_symlink() and target.read_text(encoding="utf-8") == text
+        assert [*target.parent.iterdir()] == [target]
+
+
 def contents(arrays: dict[str, np.ndarray]) -> dict:
     return {name: (array.dtype, array.tolist()) for name, array in arrays.items()}
 

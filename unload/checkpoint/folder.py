@@ -14,6 +14,7 @@ from unload.support import checks, files
 FORMAT = 14  # of the checkpoints
 IF_OTHER_VERSION = "if another version of unload has written it, go on with that one; or remove it"
 FILES = ("checkpoint.npz", "policy.safetensors", "curve.csv", "config.json")
+PARTIAL = "checkpoint.npz.*.partial"  # what killed processes wrote of one, see ``support/files.py``
 
 
 class RunFolder:
@@ -68,6 +69,7 @@ class RunFolder:
 
     def save(self, run: Any) -> None:
         """Write the ``state_dict()`` of a run as its checkpoint."""
+        self._remove(PARTIAL)  # first: the disk has room for two checkpoints
         marks = {"format": FORMAT, "package": package(), "settings": self._settings}
         files.write_nested(self._checkpoint_file, marks | {"run": run.state_dict()})
 
@@ -116,8 +118,11 @@ class RunFolder:
             said = f"{self.path} holds a run that {made_by} has trained, and this is {package()}"
             said += "; same_code=True says that both train in the same way"
             warnings.warn(said, stacklevel=4)  # of the caller of ``train``
-        # Also what a killed process wrote of one.
-        for path in (self._checkpoint_file, files.partial_of(self._checkpoint_file)):
+        for pattern in (self._checkpoint_file.name, PARTIAL):
+            self._remove(pattern)
+
+    def _remove(self, pattern: str) -> None:
+        for path in self.path.glob(pattern):
             with suppress(OSError):  # it is gone already, or the folder is read-only
                 path.unlink()
 

@@ -82,11 +82,14 @@ def main(arguments: list[str] | None = None) -> None:
         said += f", {order['early'].sum()} before their stop"
     if picture is not None:
         said += f"; the picture is {Path(picture).resolve()}"
-    print(said, file=sys.stderr)
+    if sys.stderr is not None:  # closed; print would take the screen, where the order is
+        print(said, file=sys.stderr)
 
 
 def _check_names(path: str | None, output: str | None, picture: str | None) -> None:
     """Raise ValueError if what is to be written cannot be, or would replace another file."""
+    if output is None and sys.stdout is None:
+        raise ValueError("the standard output is closed; expected it open, or --output")
     names = [] if path is None else [Path(path)]
     for option, name in {"--output": output, "--picture": picture}.items():
         if name is not None:

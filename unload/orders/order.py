@@ -163,8 +163,10 @@ def _stops(load: Load, by: str) -> np.ndarray:
     asked = by[1:] if falling else by
     if (name := named.get(asked, named.get(asked.lower()))) is None:
         known = ", ".join(load.extras) or "it has none"
-        raise ValueError(f"by is {by!r}; expected one of the list's other columns: {known}")
-    stops = pd.to_numeric(pd.Series(load.extras[name]), errors="coerce").to_numpy(float)
+        raise ValueError(f"by is {by!r}; expected one of the list's other columns: {known:.1000}")
+    cells = pd.Series(load.extras[name])
+    # A date is a number, too, and so is a missing one.
+    stops = pd.to_numeric(cells, errors="coerce").where(cells.notna()).to_numpy(float)
     wrong = np.flatnonzero(~np.isfinite(stops))
     if wrong.size:
         first = wrong[0] if load.ids is None else load.ids[wrong[0]]

@@ -25,7 +25,8 @@ ROTATIONS = ("rotation", "yaw", "pitch", "roll")
 COLUMN_NAMES = {name: name for name in (*CENTRE, *CORNER, *SIZES, *ROTATIONS, "id")}
 COLUMN_NAMES |= zip(("pos_x", "pos_y", "pos_z", "length", "width", "height"), CORNER + SIZES)
 LARGEST_NUMBER = 1e6  # a length in mm is smaller
-NUMBER_PATTERN = r"-?(0|[1-9]\d*)(\.\d+)?"  # no code with zeros in front
+# No code with zeros in front, nor one of more digits than a float64 holds.
+NUMBER_PATTERN = r"-?(?=(\.?\d){1,15}$)(0|[1-9]\d*)(\.\d+)?"
 
 
 def read_load(
@@ -46,17 +47,19 @@ def read_load(
       to the origin; or ``x``, ``y``, ``z``: its centre;
     - ``size_x``, ``size_y``, ``size_z`` or ``length``, ``width``, ``height``: edges along the axes
       as the box stands, at least 2 mm;
-    - ``id``: the number of the row if missing;
+    - ``id``: the number of the row if there is no such column;
     - ``rotation``, ``yaw``, ``pitch`` or ``roll``, in degrees: quarter turns only, because sizes
       are those after the turns.
 
-    A length's name may end in its unit: ``length_mm``, ``x (cm)``. All other columns, such as a
-    stop or a weight, become ``Load.extras``. Each line is one box; quantities are ignored. In a
-    file, columns without a name are left out.
+    A length's name may end in its unit: ``length_mm``, ``x (cm)``. In mm, a number such as 1.200 is
+    refused unless another one shows that its mark is of decimals, as 0.000 and 1200.5 do.
+
+    All other columns, such as a stop or a weight, become ``Load.extras``. Each line is one box;
+    quantities are ignored. In a file, columns without a name are left out.
 
     Args:
         path: of a CSV file (UTF-8; separated by commas, or by semicolons or tabs, where decimals
-            may have a comma) or of an Excel file (``.xlsx``, first sheet); or a
+            may have a comma) or of an Excel file (``.xlsx``, first visible sheet); or a
             ``pandas.DataFrame``, for a list that has to be read otherwise. At most 3,000 rows and
             200 columns, see ``unload.orders.table.LIMITS``.
         units: of lengths whose names say none: ``"m"``, ``"cm"``, ``"mm"`` or ``"in"``.
@@ -96,6 +99,9 @@ def read_load(
         more = f" and {len(rows) - 5} more" if len(rows) > 5 else ""
         raise ListError(f"{shown}{more}: {problem}", argument)
 
+    if "id" in names and (missing := np.flatnonzero(table[names["id"]].isna() | (ids == ""))).size:
+        refuse(missing, f"{names['id']} is empty; expected one for each box")
+
     def numbers(meaning: str) -> np.ndarray:
         name = names[meaning]
         cells = pd.to_numeric(table[name], errors="coerce").to_numpy(float)
@@ -109,9 +115,17 @@ def read_load(
         if (turned := np.flatnonzero(np.abs((numbers(turn) + 45) % 90 - 45) > 1e-3)).size:
             refuse(turned, f"a {names[turn]} that is no quarter turn; expected one")
 
-    # Lengths in m, and x from the rear.
     place = CENTRE if {*CENTRE} <= {*names} else CORNER
     read = (*place, *SIZES, "id")
+    # In mm, 1.200 has thousands or decimals; a number such as 0.000 or 1200.000 says which.
+    in_mm = table[[names[n] for n in read[:6] if (_split_unit(names[n])[1] or units) == "mm"]]
+    texts = [cell for cell in in_mm.to_numpy().ravel() if isinstance(cell, str)]
+    unclear = [cell for cell in texts if re.fullmatch(r"-?[1-9]\d{0,2}\.\d{3}", cell)]
+    if unclear and not any(re.match(r"-?(0|\d{4,})\.", cell) for cell in texts):
+        found = f"{unclear[0]!r} in mm may have thousands or decimals"
+        refuse(np.flatnonzero(in_mm.isin(unclear).any(axis=1)), f"{found}; expected 1200 or 1.2")
+
+    # Lengths in m, and x from the rear.
     lengths = [numbers(name) / UNITS[_split_unit(names[name])[1] or units] for name in read[:6]]
     centres, sizes = np.hsplit(np.stack(lengths, axis=1), 2)
     centres = centres if place is CENTRE else centres + sizes / 2
@@ -165,13 +179,13 @@ def _columns_by_meaning(names: list, columns: Mapping[str, str]) -> dict[str, st
     for name in names:
         meaning = COLUMN_NAMES.get(columns.get(name) or _split_unit(name)[0], name)
         if meaning in by_meaning:
-            raise ListError(f"the list has the columns {names}; expected one {meaning!r}")
+            raise ListError(f"the list has the columns {names!s:.1000}; expected one {meaning!r}")
         by_meaning[meaning] = name
     missing = ", ".join(name for name in SIZES if name not in by_meaning)
     if ({*CENTRE} <= {*by_meaning}) == ({*CORNER} <= {*by_meaning}):
         missing = "either x, y, z or x_min, y_min, z_min"
     if missing:
-        raise ListError(f"the list has the columns {names}; expected {missing}", "columns")
+        raise ListError(f"the list has the columns {names!s:.1000}; expected {missing}", "columns")
     return by_meaning
 
 

@@ -77,7 +77,7 @@ def read_table(path: str | Path | pd.DataFrame, header: int = 1) -> pd.DataFrame
     _check("columns", table.shape[1])
     _check("rows", len(table))
     if not len(table):
-        raise ListError(f"the list has the columns {[*table]} and no row; expected boxes")
+        raise ListError(f"the list has the columns {[*table]!s:.1000} and no row; expected boxes")
     return table
 
 
@@ -132,14 +132,21 @@ def _csv(content: bytes, header: int) -> Iterable[list[str]]:
         if line.count(mark) >= _COLUMNS - 1:
             separator = mark
             break
-    lines = csv.reader(StringIO(text, newline=None), delimiter=separator, skipinitialspace=True)
-    if separator == ",":
-        return lines
-    return ([re.sub(r"^(-?\d+),(\d+)$", r"\1.\2", cell.strip()) for cell in line] for line in lines)
+    for number, line in enumerate(StringIO(text, newline=None), 1):
+        # Each line by itself: a quotation mark that is not closed would take in those below.
+        reader = csv.reader([line], delimiter=separator, skipinitialspace=True, strict=True)
+        try:
+            cells = next(reader) if number >= header else []
+        except csv.Error as error:
+            wanted = "expected a cell that begins with a quotation mark to end with one there"
+            raise ListError(f"line {number} is no line of CSV: {error}; {wanted}") from error
+        if separator != ",":
+            cells = [re.sub(r"^(-?\d+),(\d+)$", r"\1.\2", cell.strip()) for cell in cells]
+        yield cells
 
 
 def _excel(content: bytes) -> Iterable[list[str]]:
-    """The cells of each line of the first sheet of cells."""
+    """The cells of each line of the first sheet of cells that is not hidden."""
     with checks.needed_for("an Excel file"):
         from openpyxl import load_workbook
     # Pictures are left out; what remains is as long as the archive says, or damaged.
@@ -152,7 +159,8 @@ def _excel(content: bytes) -> Iterable[list[str]]:
         _check("bytes of XML", sum(part.file_size for part in xml), instead)
         for part in xml:
             reduced.writestr(part.filename, parts.read(part))
-    sheet = load_workbook(copy, read_only=True, data_only=True, keep_links=False).worksheets[0]
+    book = load_workbook(copy, read_only=True, data_only=True, keep_links=False)
+    sheet = [each for each in book.worksheets if each.sheet_state == "visible"][0]
     sheet.reset_dimensions()  # what a file says of its sheet's size may be wrong
     return ([*map(_text, line)] for line in sheet.iter_rows(values_only=True))
 

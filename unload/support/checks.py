@@ -38,7 +38,7 @@ def one_of(name: str, value: object, options: Iterable[_Option]) -> _Option:
     single = isinstance(value, Hashable) and getattr(value, "shape", ()) == ()  # no array or tensor
     if not (single and value in options):
         known = ", ".join(repr(option) for option in options)
-        raise ValueError(f"{name} is {value!r}; expected one of {known}")
+        raise ValueError(f"{name} is {value!r}; expected one of {known:.1000}")
     return options[options.index(value)]
 
 

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from hashlib import blake2b, file_digest
 from importlib import resources
 from pathlib import Path
+from secrets import token_hex
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -22,29 +23,25 @@ POLICIES = {file.stem: file for file in sorted(SHIPPED.glob("policies/*.safetens
 
 
 def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> None:
-    """Let ``write`` fill ``<path>.partial``, which replaces ``path`` once it is complete on disk.
+    """Let ``write`` fill a new file beside ``path``, which replaces it once complete on disk.
 
-    A killed writer leaves the partial file, which nothing reads, git ignores, and the next writer
-    overwrites. Where several processes may write one file, each takes a lock first, see ``locked``.
+    Where ``path`` is a link, what it points to is replaced. Of several writers the last one counts.
+    A killed one leaves its ``<path>.<random>.partial``, which nothing reads and git ignores.
     """
-    path, partial = Path(path), partial_of(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
+    target = Path(os.path.realpath(path))
+    partial = Path(f"{target}.{token_hex(8)}.partial")
+    target.parent.mkdir(parents=True, exist_ok=True)
     try:
-        with open(partial, "wb") as file:
+        with open(partial, "xb") as file:
             write(file)
             file.flush()
             os.fsync(file.fileno())
-        os.replace(partial, path)
+        os.replace(partial, target)
     except OSError as error:
         reason = f"cannot write this file: {error.strerror or error}"
         raise OSError(error.errno, reason, str(path)) from error
     finally:
         partial.unlink(missing_ok=True)  # of a write that failed
-
-
-def partial_of(path: str | Path) -> Path:
-    """Path of a file while it is being written."""
-    return Path(f"{path}.partial")
 
 
 def write_text(path: str | Path, text: str) -> None:
