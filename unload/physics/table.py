@@ -16,9 +16,9 @@ from typing import Literal, get_args
 import numpy as np
 
 from unload import task
-from unload.physics.bullet import DAMPING, ENGINES, HALF, TIME_STEP, engine_of
+from unload.physics.bullet import DAMPING, ENGINES, TIME_STEP, engine_of
 from unload.physics.local import LocalPhysics, settings_of_lifts
-from unload.physics.situation import Situation, digest_of
+from unload.physics.situation import Situation
 from unload.support import checks, files
 from unload.support.compiled import compiled
 
@@ -30,6 +30,7 @@ HELD_DOWN = 3  # so many boxes on top hold a box down
 # than a share of the half edge, by their number; and none farther than ``FARTHEST`` half edges.
 MIDDLE = (0.0, 0.5, 0.75)
 FARTHEST = 2.0
+HARDLY = 0.25  # of the threshold
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
 _ARRAYS = {"digests", "micrometres", "settings"}  # of a file
 
@@ -52,7 +53,7 @@ FREE_LIFT = free_lift()
 class LiftTable:
     """Distances in micrometres by the digest of a situation; empty at first.
 
-    A lift that was given up half-way has 0, see ``TablePhysics``.
+    A lift that was given up has 0, see ``TablePhysics``.
 
     Two arrays, so that compiled code can look into them, too. Among a million situations two
     share a 64-bit digest with a probability of 3e-8.
@@ -79,12 +80,12 @@ class LiftTable:
 
     def find(self, situation: Situation) -> float | None:
         """Return the distance in m that the table holds for a situation, or None."""
-        micrometres = find_distance(*self.entries, _digest(situation))
+        micrometres = find_distance(*self.entries, situation.digest)
         return None if micrometres == UNKNOWN else int(micrometres) / 1e6
 
     def add(self, situation: Situation, distance: float) -> None:
         """Remember a distance in m, to the micrometre. A situation that is known keeps its own."""
-        digest = _digest(situation)
+        digest = situation.digest
         with self._adding:
             digests, micrometres = self.entries
             if find_distance(digests, micrometres, digest) == UNKNOWN:
@@ -171,16 +172,21 @@ class TablePhysics(LocalPhysics):
         return distance
 
 
-def hopeless(moved: float, speed: float) -> bool:
-    """Whether a pull cannot lift a box any more, even if nothing holds it from now on.
+def hopeless(moved: float, speed: float, left: float) -> bool:
+    """Whether a pull will not lift a box any more.
+
+    It cannot if a free rise from now on were too short. It will not if the box, with the mean
+    acceleration that it has had, would reach a quarter of the threshold at most (``HARDLY``).
 
     Args:
-        moved: m, within the first ``HALF``.
+        moved: m, so far.
         speed: m/s, of its centre.
+        left: s, of the pull.
     """
-    seconds = task.LIFT_TIME - HALF
-    rise = (task.PICK_FORCE / task.MASS - task.GRAVITY) * seconds**2 / 2
-    return moved + speed * seconds + rise < task.LIFT_THRESHOLD
+    free = task.PICK_FORCE / task.MASS - task.GRAVITY
+    mean = speed / (task.LIFT_TIME - left)
+    freely, as_before = (moved + speed * left + a * left**2 / 2 for a in (free, mean))
+    return freely < task.LIFT_THRESHOLD or as_before < HARDLY * task.LIFT_THRESHOLD
 
 
 @cache
@@ -205,10 +211,6 @@ def make_physics(physics: PhysicsName | LocalPhysics) -> LocalPhysics:
     if physics == "local":
         return LocalPhysics()
     return TablePhysics(shared_table()) if physics == "table" else TablePhysics(held_down=1)
-
-
-def _digest(situation: Situation) -> np.uint64:
-    return np.uint64(digest_of(np.frombuffer(situation.key, np.int32)))
 
 
 @compiled(plain=True)
