@@ -22,10 +22,11 @@ from studies.style import styled
 from unload import task
 from unload.env import observation
 from unload.load.boxes import Load
+from unload.physics import table
 from unload.physics.bullet import ENGINES
 from unload.physics.local import LocalPhysics, settings_of_lifts
 from unload.physics.situation import Situation, Surroundings
-from unload.physics.table import FARTHEST, HELD_DOWN, MIDDLE, LiftTable, TablePhysics, held_by_rule
+from unload.physics.table import HELD_DOWN, MIDDLE, LiftTable, TablePhysics, held_by_rule
 
 NAME = "certain_lifts"
 # First seed of a part, and how many lifts of each family; no other data uses these seeds.
@@ -40,6 +41,7 @@ COLUMNS = [
     "part", "family", "on_top", "common", "farthest", "answer", *ENGINES,
     *(f"table_{engine}" for engine in ENGINES),
 ]  # fmt: skip
+BOUNDS = ("middle", "farthest", "between", "covered", "flat", "hardly")  # see ``physics.table``
 ANSWERS = (
     "three or more on top", "on its middle", "between others", "given up early",
     "simulated to the end",
@@ -57,8 +59,7 @@ def certain_data() -> None:
     lifts = measured(ask_all)
     settings = {engine: settings_of_lifts(engine) for engine in ENGINES}
     settings |= {
-        "middle": MIDDLE,
-        "farthest": FARTHEST,
+        **{name: getattr(table, name.upper()) for name in BOUNDS},
         "first seed and lifts of each family": PARTS,
     }
     publish(NAME, {NAME: lifts.value}, f"{COMMAND} certain", settings, [lifts], float_format="%.6f")
