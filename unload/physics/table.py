@@ -222,7 +222,7 @@ def make_physics(physics: PhysicsName | LocalPhysics) -> LocalPhysics:
     return TablePhysics(shared_table()) if physics == "table" else TablePhysics(held_down=1)
 
 
-def _inserted(array: np.ndarray, place: int, value: int) -> np.ndarray:
+def _inserted(array: np.ndarray, place: np.integer, value: int | np.integer) -> np.ndarray:
     """What ``np.insert`` makes, in half the time."""
     return np.concatenate((array[:place], array.dtype.type(value)[np.newaxis], array[place:]))
 
