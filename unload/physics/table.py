@@ -31,13 +31,13 @@ HELD_DOWN = 3  # so many boxes on top hold a box down
 # One or two hold it down, too, if they lie on its middle: if their common centre is no farther from
 # its own, along x and y, than a share of the half edge, by their number; and none farther than
 # ``FARTHEST`` half edges.
-MIDDLE = (0.0, 0.5, 0.75)
-FARTHEST = 2.0
+MIDDLE = (0.0, 0.5, 0.6)
+FARTHEST = 1.5
 # A box between two others cannot tip sideways. So the common centre of what lies on it may be off
-# the middle by these shares of the half edge along x and y, and a single one by the third. The
-# others cover this share of its left and of its right face, and it is not flat: a box that is wider
-# than so many heights tips within the gaps.
-BETWEEN = (0.5, 1.0, 1.5)
+# the middle by these shares of the half edge along x and y. The others cover this share of its left
+# and of its right face, and it is not flat: a box that is wider than so many heights tips within the
+# gaps.
+BETWEEN = (0.5, 1.0)
 COVERED, FLAT = 0.5, 4.0
 HARDLY = 0.25  # of the threshold
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
@@ -251,27 +251,26 @@ def held_by_rule(key):
     on_top = key[0] - 1
     if on_top >= len(MIDDLE):
         return False
-    if _lies_within(key, first, MIDDLE[on_top], MIDDLE[on_top], FARTHEST):
+    if _lies_within(key, first, MIDDLE[on_top], MIDDLE[on_top]):
         return True
     return _lies_within(key, first, *BETWEEN) and _between_others(key, first)
 
 
 @compiled(plain=True)
-def _lies_within(key, first, along_x, along_y, farthest):
-    """Whether the common centre of the boxes on top, and each centre, are so near, in half edges.
+def _lies_within(key, first, along_x, along_y):
+    """Whether the common centre of the boxes on top is so near, and each one not too far.
 
     Args:
         key: the words of a situation's key.
         first: the index of the chosen box's in it.
-        along_x, along_y: of the common centre, at most.
-        farthest: of a single one along either axis, at most.
+        along_x, along_y: in half edges, of the common centre, at most.
     """
     on_top = key[0] - 1
     for axis, middle in enumerate((along_x, along_y)):
         edge, total = key[first + 3 + axis], 0
         for box in range(1, on_top + 1):
             centre = key[first + 6 * box + axis]
-            if 2 * abs(centre) > farthest * edge:
+            if 2 * abs(centre) > FARTHEST * edge:
                 return False
             total += centre
         if 2 * abs(total) > middle * on_top * edge:
