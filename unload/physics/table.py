@@ -35,8 +35,8 @@ MIDDLE = (0.0, 0.5, 0.6)
 FARTHEST = 1.5
 # A box between two others cannot tip sideways. So the common centre of what lies on it may be off
 # the middle by these shares of the half edge along x and y. The others cover this share of its left
-# and of its right face, and it is not flat: a box that is wider than so many heights tips within the
-# gaps.
+# and of its right face, and it is not flat: a box that is wider than so many heights tips within
+# the gaps.
 BETWEEN = (0.5, 1.0)
 COVERED, FLAT = 0.5, 4.0
 HARDLY = 0.25  # of the threshold
