@@ -55,9 +55,9 @@ def pile(*centres: tuple[float, float], floor: int | None = None, sides=()) -> S
         ([(0.49, -0.49)], True),
         ([(0.51, 0)], False),
         ([(0, -0.51)], False),
-        ([(1.49, 0), (-0.3, 0.7)], True),
+        ([(1.49, 0), (-0.6, 0.7)], True),
         ([(1.51, 0), (-0.9, 0)], False),
-        ([(0.5, 1.3), (-0.5, -0.05)], False),
+        ([(0.5, 1.1), (-0.5, -0.05)], False),
     ],
     ids=str,
 )

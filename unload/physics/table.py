@@ -29,15 +29,12 @@ PhysicsName = Literal["local", "places", "table"]
 UNKNOWN = -1  # in place of a distance that is not in the table
 HELD_DOWN = 3  # so many boxes on top hold a box down
 # One or two hold it down, too, if they lie on its middle: if their common centre is no farther from
-# its own, along x and y, than a share of the half edge, by their number; and none farther than
-# ``FARTHEST`` half edges.
-MIDDLE = (0.0, 0.5, 0.6)
+# its own, along x and y, than this share of the half edge; and none farther than ``FARTHEST``.
+MIDDLE = 0.5
 FARTHEST = 1.5
-# A box between two others cannot tip sideways. So the common centre of what lies on it may be off
-# the middle by these shares of the half edge along x and y. The others cover this share of its left
-# and of its right face, and it is not flat: a box that is wider than so many heights tips within
-# the gaps.
-BETWEEN = (0.5, 1.0)
+# A box between two others cannot tip sideways. So along y the common centre of what lies on it may
+# be anywhere above it. The others cover this share of its left and of its right face, and it is not
+# flat: a box that is wider than so many heights tips within the gaps.
 COVERED, FLAT = 0.5, 4.0
 HARDLY = 0.25  # of the threshold
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
@@ -241,19 +238,16 @@ def held_by_rule(key):
 
     The pull raises 1.04 boxes besides the chosen one. So one on its middle rises by 9 mm, and off
     it, it tips aside, unless it stands between others; two on it hold it down even if their other
-    ends lie on neighbours. See ``MIDDLE`` and ``BETWEEN``.
+    ends lie on neighbours. See ``MIDDLE`` and ``COVERED``.
 
     Args:
         key: the words of a situation's key, see ``write_key``.
     """
     first = 2 + key[1]
     first += (len(key) - first) % 6  # behind the sides
-    on_top = key[0] - 1
-    if on_top >= len(MIDDLE):
+    if key[0] - 1 >= HELD_DOWN or not _lies_within(key, first, MIDDLE, 1.0):
         return False
-    if _lies_within(key, first, MIDDLE[on_top], MIDDLE[on_top]):
-        return True
-    return _lies_within(key, first, *BETWEEN) and _between_others(key, first)
+    return _lies_within(key, first, MIDDLE, MIDDLE) or _between_others(key, first)
 
 
 @compiled(plain=True)
