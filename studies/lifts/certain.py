@@ -3,8 +3,9 @@
     python -m studies certain
 
 A box with others on it is held down for certain, or simulated: ``TablePhysics`` decides which. The
-bounds of its rule (``table.MIDDLE``) were chosen on the lifts of one part; the other part was drawn
-anew. Both engines lift each box to the end, and what an empty table says by each stands beside it.
+bounds of its rules (``table.MIDDLE`` and those below it) were chosen on the lifts of one part and
+thousands like them; the other part was drawn anew. Both engines lift each box to the end, and what
+an empty table says by each stands beside it.
 """
 
 from collections.abc import Iterator
@@ -21,24 +22,30 @@ from studies.style import styled
 from unload import task
 from unload.env import observation
 from unload.load.boxes import Load
+from unload.physics import table
 from unload.physics.bullet import ENGINES
 from unload.physics.local import LocalPhysics, settings_of_lifts
 from unload.physics.situation import Situation, Surroundings
-from unload.physics.table import FARTHEST, HELD_DOWN, MIDDLE, LiftTable, TablePhysics, held_by_rule
+from unload.physics.table import HELD_DOWN, MIDDLE, LiftTable, TablePhysics, held_by_rule
 
 NAME = "certain_lifts"
 # First seed of a part, and how many lifts of each family; no other data uses these seeds.
-PARTS = {"bounds": (1_100_000, 100), "drawn anew": (1_200_000, 500)}
+PARTS = {"bounds": (1_100_000, 100), "drawn anew": (1_500_000, 600)}
 PER_LOAD = 25  # lifts of a load, at most
 ASKED = 0.2  # share of the failing picks that are asked about
-STACKS = "made-up stacks"  # besides the families: a box of any proportions, and one or two on it
+# Besides the families: boxes of any proportions, one or two on another, which stands alone or not.
+STACKS = ("made-up stacks", "made-up stacks between others")
 EDGES = (0.05, 1.5)  # m, of boxes of these stacks
 MAX_OFFSET = 1.2  # half edges, their common centre
 COLUMNS = [
     "part", "family", "on_top", "common", "farthest", "answer", *ENGINES,
     *(f"table_{engine}" for engine in ENGINES),
 ]  # fmt: skip
-ANSWERS = ("three or more on top", "on its middle", "given up half-way", "simulated to the end")
+BOUNDS = ("middle", "farthest", "covered", "flat", "hardly")  # see ``physics.table``
+ANSWERS = (
+    "three or more on top", "on its middle", "between others", "given up early",
+    "simulated to the end",
+)  # fmt: skip
 
 
 def certain_data() -> None:
@@ -52,8 +59,7 @@ def certain_data() -> None:
     lifts = measured(ask_all)
     settings = {engine: settings_of_lifts(engine) for engine in ENGINES}
     settings |= {
-        "middle": MIDDLE,
-        "farthest": FARTHEST,
+        **{name: getattr(table, name.upper()) for name in BOUNDS},
         "first seed and lifts of each family": PARTS,
     }
     publish(NAME, {NAME: lifts.value}, f"{COMMAND} certain", settings, [lifts], float_format="%.6f")
@@ -65,8 +71,8 @@ def ask_all() -> pd.DataFrame:
     tables = {f"table_{engine}": TablePhysics(LiftTable(engine)) for engine in ENGINES}
     rows = []
     for part, (seed, lifts) in PARTS.items():
-        for family in (*FAMILIES, STACKS):
-            asked = _stacks(seed) if family == STACKS else _blocked(family, seed)
+        for family in (*FAMILIES, *STACKS):
+            asked = _stacks(family, seed) if family in STACKS else _blocked(family, seed)
             for _, situation in zip(range(lifts), asked):
                 said = {name: each.simulate(situation) for name, each in (exact | tables).items()}
                 row = {"part": part, "family": family, "on_top": situation.on_top, **said}
@@ -108,18 +114,19 @@ def over_middle(frame: pd.DataFrame) -> Figure:
     """How far PyBullet lifts a box over how far off its middle one or two others lie on it.
 
     Args:
-        frame: see ``certain_data``. The rule answers filled dots, in the shaded part.
+        frame: see ``certain_data``. The rule answers filled dots: those in the shaded part, and
+            others of boxes that stand between two.
     """
     figure, panels = plt.subplots(1, HELD_DOWN - 1, figsize=(9, 3.6), sharex=True, sharey=True)
     for on_top, axes in enumerate(panels, 1):
         lifts = frame[frame["on_top"] == on_top]
         for number, (family, group) in enumerate(lifts.groupby("family", sort=False)):
-            ruled = group["answer"] == ANSWERS[1]
+            ruled = group["answer"].isin(ANSWERS[1:3])
             for some, face in ((group[ruled], f"C{number}"), (group[~ruled], "none")):
                 dots = {"s": 14, "edgecolor": f"C{number}", "facecolor": face, "linewidth": 0.7}
                 label = family if face == "none" else None
                 axes.scatter(some["common"], some[ENGINES[0]], label=label, **dots)
-        axes.axvspan(0, MIDDLE[on_top], color="0.93", zorder=0)
+        axes.axvspan(0, MIDDLE, color="0.93", zorder=0)
         axes.axhline(task.LIFT_THRESHOLD, color="C5", ls="--", lw=1, label="threshold")
         axes.set(xlim=(0, MAX_OFFSET), xlabel="common centre off the middle (half edges)")
         axes.set_title("one box on top" if on_top == 1 else f"{on_top} boxes on top", fontsize=9)
@@ -133,8 +140,8 @@ def _answer(situation: Situation, distance: float) -> str:
     if situation.on_top >= HELD_DOWN:
         return ANSWERS[0]
     if held_by_rule(np.frombuffer(situation.key, np.int32)):
-        return ANSWERS[1]
-    return ANSWERS[3] if distance else ANSWERS[2]
+        return ANSWERS[1 if offsets(situation)[0] <= MIDDLE else 2]
+    return ANSWERS[4] if distance else ANSWERS[3]
 
 
 def _blocked(family: str, seed: int) -> Iterator[Situation]:
@@ -159,23 +166,50 @@ def _met(load: Load, rng: np.random.Generator) -> Iterator[Situation]:
             yield around.situation(item)
 
 
-def _stacks(seed: int) -> Iterator[Situation]:
+def _stacks(kind: str, seed: int) -> Iterator[Situation]:
     """Boxes of any proportions on the floor, each with one or two boxes of any proportions on it.
 
-    Of two, one stands on the other or beside it.
+    Of two, one stands on the other or beside it. Those of the second kind stand between two more
+    boxes on the floor.
     """
-    rng = np.random.default_rng([seed, len(FAMILIES)])
+    rng = np.random.default_rng([seed, len(FAMILIES) + STACKS.index(kind)])
     while True:
-        sizes = np.exp(rng.uniform(*np.log(EDGES), (rng.integers(2, 4), 3)))
-        boxes = np.hstack([np.zeros_like(sizes), sizes])
+        boxes = np.zeros((rng.integers(2, 4), 6))
+        boxes[:, 3:] = _sizes(rng, len(boxes))
         tower = rng.random() < 0.5
         for row in range(1, len(boxes)):
             base = boxes[row - 1 if tower else 0]
             reach = (base[3:5] + boxes[row, 3:5]) / 2 - 0.002  # m, of a shared stretch at least
             boxes[row, :2] = base[:2] + rng.uniform(-1, 1, 2) * reach
             boxes[row, 2] = base[2] + (base[5] + boxes[row, 5]) / 2
-        apart = np.abs(boxes[-1, :3] - boxes[-2, :3]) - (boxes[-1, 3:] + boxes[-2, 3:]) / 2
+        dynamic = len(boxes)
+        if kind == STACKS[1]:
+            boxes = np.vstack([boxes, _neighbours(rng, boxes[0, 3:])])
+
         floor = round(-boxes[0, 5] / 2 * 1e6)
-        made = Situation(np.rint(boxes * 1e6).astype(np.int32), len(boxes), floor, ())
-        if (apart > -1e-9).any() and offsets(made)[0] <= MAX_OFFSET:
+        made = Situation(np.rint(boxes * 1e6).astype(np.int32), dynamic, floor, ())
+        apart = np.abs(boxes[:, None, :3] - boxes[:, :3]) - (boxes[:, None, 3:] + boxes[:, 3:]) / 2
+        overlaps = (apart < -1e-9).all(axis=-1).sum() > len(boxes)  # each with itself
+        if not overlaps and offsets(made)[0] <= MAX_OFFSET:
             yield made
+
+
+def _neighbours(rng: np.random.Generator, size: np.ndarray) -> np.ndarray:
+    """A box to the left of one at the origin and one to its right, (2, 6) in m.
+
+    Half of these pairs cover its sides, as in a wall; the others lie anywhere.
+    """
+    boxes = np.zeros((2, 6))
+    boxes[:, 3:] = _sizes(rng, 2)
+    if rng.random() < 0.5:
+        boxes[:, 3], boxes[:, 5] = size[0], size[2]
+    else:
+        boxes[:, 0] = rng.uniform(-1, 1, 2) * (size[0] + boxes[:, 3]) / 2
+    boxes[:, 1] = (size[1] + boxes[:, 4]) / 2 * (-1, 1)
+    boxes[:, 2] = (boxes[:, 5] - size[2]) / 2
+    return boxes
+
+
+def _sizes(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Edge lengths of so many boxes, (count, 3) in m."""
+    return np.exp(rng.uniform(*np.log(EDGES), (count, 3)))

@@ -4,6 +4,7 @@ Their joints are real numbers, so that no situation is met twice. ``FAMILIES`` h
 """
 
 from collections.abc import Callable
+from itertools import accumulate, chain
 
 import numpy as np
 
@@ -55,7 +56,7 @@ def crossed(rng: np.random.Generator) -> unload.Load:
     for depth in range(int(LENGTH / size[0])):
         for side in range(int(WIDTH / size[1])):
             for turn, layer in enumerate(_cut(rng, STACKED, HEIGHTS)):
-                counts = rng.integers((2, 1), (4, 3))[:: 1 if turn % 2 else -1]
+                counts = [rng.integers(2, 4), rng.integers(1, 3)][:: 1 if turn % 2 else -1]
                 along, across = (
                     _divided(rng, first * edge, edge, count)
                     for first, edge, count in zip((depth, side), size, counts)
@@ -86,9 +87,9 @@ def _cut(rng: np.random.Generator, end: float, steps: Interval) -> list[Interval
 
 def _divided(rng: np.random.Generator, first: float, length: float, count: int) -> list[Interval]:
     """An interval in so many neighbouring ones, of which none is twice as long as another."""
-    ends = np.zeros(count + 1)
-    rng.uniform(1.0, 2.0, count).cumsum(out=ends[1:])
-    ends = (first + length / ends[-1] * ends).tolist()
+    ends = [0.0, *accumulate(rng.uniform(1.0, 2.0, count).tolist())]
+    scale = length / ends[-1]
+    ends = [first + scale * end for end in ends]
     return list(zip(ends, ends[1:]))
 
 
@@ -101,5 +102,6 @@ def _part(rng: np.random.Generator, first: float, last: float) -> Interval:
 
 def _load(boxes: list[tuple[Interval, Interval, Interval]]) -> unload.Load:
     """The load of boxes by their intervals along x, y and z, in m."""
-    low, high = np.moveaxis(np.array(boxes), -1, 0)
+    flat = np.fromiter(chain.from_iterable(chain.from_iterable(boxes)), float, 6 * len(boxes))
+    low, high = flat.reshape(-1, 3, 2).transpose(2, 0, 1)
     return unload.Load((low + high) / 2, high - low)

@@ -75,6 +75,7 @@ DAMPING = 0.04
 # Boxes are made this much narrower (x and y), so that neighbours do not rub: side by
 # side without a gap, free boxes rise less, and at a higher friction many jam.
 GAP = 0.001  # m
+_GAPS = np.array([GAP, GAP, 0.0])
 # What a lift's outcome depends on besides the boxes; the solver is left as PyBullet has it.
 SETTINGS = {
     "pybullet": _version(),
@@ -90,13 +91,13 @@ SETTINGS = {
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # orientation of a box that is not turned
 ITERATIONS = 50
-# s, after which a pull may be given up: 32 of its 72 steps, enough to tell most that fail.
-HALF = 32 * TIME_STEP
+# s, after which a pull may be given up, again and again: 16 of its 72 steps tell most that fail.
+ASKED_EVERY = 16 * TIME_STEP
 
 
 def slim(size: np.ndarray) -> np.ndarray:
     """A box's edges in m with half the gap taken off each of its sides in x and y."""
-    return size - np.array([GAP, GAP, 0.0])
+    return size - _GAPS
 
 
 class Client:
@@ -237,7 +238,7 @@ class World:
         body: int,
         force: float = task.PICK_FORCE,
         seconds: float = task.LIFT_TIME,
-        hopeless: Callable[[float, float], bool] | None = None,
+        hopeless: Callable[[float, float, float], bool] | None = None,
     ) -> float:
         """Pull a body upwards at its centre of mass; return how far it moved, in m (Sec. III-C).
 
@@ -245,20 +246,21 @@ class World:
             body: which one.
             force: N.
             seconds: how long, rounded to whole time steps.
-            hopeless: is asked after ``HALF``, with how far the body has moved, in m, and its speed,
-                in m/s, whether to give up, which returns 0. A pull that goes on ends with the same
-                bits as one that was not asked.
+            hopeless: is asked whenever ``ASKED_EVERY`` has passed, with how far the body has moved,
+                in m, its speed, in m/s, and the s that are left, whether to give up, which returns
+                0. A pull that goes on ends with the same bits as one that was not asked.
         """
         start = np.array(self.pose(body)[0])
 
         def moved() -> float:
             return float(np.linalg.norm(np.array(self.pose(body)[0]) - start))
 
-        if hopeless is not None:
-            self.step(HALF, body, (0.0, 0.0, force))
-            if hopeless(moved(), float(np.linalg.norm(self.client.getBaseVelocity(body)[0]))):
+        while hopeless is not None and seconds > ASKED_EVERY:
+            self.step(ASKED_EVERY, body, (0.0, 0.0, force))
+            seconds -= ASKED_EVERY
+            speed = float(np.linalg.norm(self.client.getBaseVelocity(body)[0]))
+            if hopeless(moved(), speed, seconds):
                 return 0.0
-            seconds -= HALF
         self.step(seconds, body, (0.0, 0.0, force))
         return moved()
 

@@ -47,9 +47,9 @@ class LocalPhysics:
         return self._pull(situation)
 
     def _pull(
-        self, situation: Situation, hopeless: Callable[[float, float], bool] | None = None
+        self, situation: Situation, hopeless: Callable[[float, float, float], bool] | None = None
     ) -> float:
-        """``simulate``, or give up half-way, see ``bullet.World.pull``."""
+        """``simulate``, or give up early, see ``bullet.World.pull``."""
         if self.engine == "mujoco":
             return round(mujoco.simulate(situation, hopeless), 6)
         if self._world is None:
@@ -60,8 +60,9 @@ class LocalPhysics:
         world = self._world
         bodies: list[int] = []
         try:
-            places, sizes = np.split(situation.boxes * RESOLUTION, 2, axis=1)
-            for row, (place, size) in enumerate(zip(places.tolist(), slim(sizes).tolist())):
+            boxes = situation.boxes * RESOLUTION
+            places, sizes = boxes[:, :3].tolist(), slim(boxes[:, 3:]).tolist()
+            for row, (place, size) in enumerate(zip(places, sizes)):
                 mass = task.MASS if row < situation.dynamic else 0.0
                 bodies.append(world.add_box(place, size, mass))
             if situation.floor is not None:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from unload import task
-from unload.physics.bullet import DAMPING, FRICTION, HALF, SETTINGS, TIME_STEP, slim
+from unload.physics.bullet import ASKED_EVERY, DAMPING, FRICTION, SETTINGS, TIME_STEP, slim
 from unload.physics.situation import RESOLUTION, Situation
 
 STEP = TIME_STEP / 2  # s; its own contacts are soft, and a shorter step makes them firm enough
@@ -25,7 +25,9 @@ def settings() -> dict:
     return {name: value for name, value in own.items() if name != "pybullet"}
 
 
-def simulate(situation: Situation, hopeless: Callable[[float, float], bool] | None = None) -> float:
+def simulate(
+    situation: Situation, hopeless: Callable[[float, float, float], bool] | None = None
+) -> float:
     """Pull the chosen box of a situation; return how far it moved, in m (Sec. III-C).
 
     Args:
@@ -46,15 +48,17 @@ def simulate(situation: Situation, hopeless: Callable[[float, float], bool] | No
     mujoco.mj_kinematics(model, data)
     start = data.xpos[1].copy()  # body 0 is the world
     data.xfrc_applied[1, 2] = task.PICK_FORCE
-    moved = 0.0
-    for seconds in (HALF, task.LIFT_TIME - HALF):
-        mujoco.mj_step(model, data, nstep=round(seconds / STEP))
+    moved, seconds = 0.0, task.LIFT_TIME
+    while seconds > 0:
+        part = min(seconds, ASKED_EVERY)
+        mujoco.mj_step(model, data, nstep=round(part / STEP))
+        seconds -= part
         mujoco.mj_kinematics(model, data)
         if any(warning.number for warning in data.warning):
             raise FloatingPointError("MuJoCo cannot simulate a lift; see MUJOCO_LOG.TXT")
         moved = float(np.linalg.norm(data.xpos[1] - start))
         speed = float(np.linalg.norm(data.qvel[:3]))
-        if hopeless is not None and seconds == HALF and hopeless(moved, speed):
+        if hopeless is not None and seconds > 0 and hopeless(moved, speed, seconds):
             return 0.0
     return moved
 

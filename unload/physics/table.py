@@ -4,7 +4,8 @@ A lift depends on its situation alone, so a table of lifts says how far the box 
 moved. The table is only as good as the physics that filled it: a file of another physics is
 refused. Where physics leaves no doubt, rules answer instead: a box with nothing on top is free, one
 with three or more others on top is held down, and so is one under one or two others that lie on its
-middle. What is simulated is given up where it has become hopeless.
+middle, or near it if it stands between others. What is simulated is given up where it has become
+hopeless.
 """
 
 import json
@@ -16,9 +17,10 @@ from typing import Literal, get_args
 import numpy as np
 
 from unload import task
-from unload.physics.bullet import DAMPING, ENGINES, HALF, TIME_STEP, engine_of
+from unload.load.boxes import CONTACT_TOLERANCE
+from unload.physics.bullet import DAMPING, ENGINES, TIME_STEP, engine_of
 from unload.physics.local import LocalPhysics, settings_of_lifts
-from unload.physics.situation import Situation, digest_of
+from unload.physics.situation import RESOLUTION, Situation
 from unload.support import checks, files
 from unload.support.compiled import compiled
 
@@ -26,10 +28,15 @@ PhysicsName = Literal["local", "places", "table"]
 
 UNKNOWN = -1  # in place of a distance that is not in the table
 HELD_DOWN = 3  # so many boxes on top hold a box down
-# One or two hold it down, too, if their common centre is no farther from its own, along x and y,
-# than a share of the half edge, by their number; and none farther than ``FARTHEST`` half edges.
-MIDDLE = (0.0, 0.5, 0.75)
-FARTHEST = 2.0
+# One or two hold it down, too, if they lie on its middle: if their common centre is no farther from
+# its own, along x and y, than this share of the half edge; and none farther than ``FARTHEST``.
+MIDDLE = 0.5
+FARTHEST = 1.5
+# A box between two others cannot tip sideways. So along y the common centre of what lies on it may
+# be anywhere above it. The others cover this share of its left and of its right face, and it is not
+# flat: a box that is wider than so many heights tips within the gaps.
+COVERED, FLAT = 0.5, 4.0
+HARDLY = 0.25  # of the threshold
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
 _ARRAYS = {"digests", "micrometres", "settings"}  # of a file
 
@@ -52,7 +59,7 @@ FREE_LIFT = free_lift()
 class LiftTable:
     """Distances in micrometres by the digest of a situation; empty at first.
 
-    A lift that was given up half-way has 0, see ``TablePhysics``.
+    A lift that was given up has 0, see ``TablePhysics``.
 
     Two arrays, so that compiled code can look into them, too. Among a million situations two
     share a 64-bit digest with a probability of 3e-8.
@@ -79,18 +86,18 @@ class LiftTable:
 
     def find(self, situation: Situation) -> float | None:
         """Return the distance in m that the table holds for a situation, or None."""
-        micrometres = find_distance(*self.entries, _digest(situation))
+        micrometres = find_distance(*self.entries, situation.digest)
         return None if micrometres == UNKNOWN else int(micrometres) / 1e6
 
     def add(self, situation: Situation, distance: float) -> None:
         """Remember a distance in m, to the micrometre. A situation that is known keeps its own."""
-        digest = _digest(situation)
+        digest = situation.digest
         with self._adding:
             digests, micrometres = self.entries
             if find_distance(digests, micrometres, digest) == UNKNOWN:
                 place = np.searchsorted(digests, digest)
-                new = np.insert(micrometres, place, round(distance * 1e6))
-                self.entries = np.insert(digests, place, digest), new
+                new = _inserted(micrometres, place, round(distance * 1e6))
+                self.entries = _inserted(digests, place, digest), new
 
     def save(self, path: str | Path) -> None:
         """Write the table as ``.npz``, in one atomic step; equal tables give equal bytes."""
@@ -128,8 +135,8 @@ class TablePhysics(LocalPhysics):
     A box with nothing on top moves by ``free_lift``, as PyBullet says. One with three or more
     others on it counts as held down and is not simulated: such situations hardly ever repeat, and
     of those in ``data/lift_agreement.csv`` PyBullet lifts none by more than 4 cm. What the table
-    lacks is held down where one or two others lie on its middle (see ``held_by_rule``), and
-    simulated elsewhere. A lift that is certain to fail says 0 m.
+    lacks is held down where one or two others lie on or near its middle (see ``held_by_rule``),
+    and simulated elsewhere. A lift that is certain to fail says 0 m.
 
     Args:
         table: filled by its engine as situations are met. Share one among environments to share
@@ -171,16 +178,21 @@ class TablePhysics(LocalPhysics):
         return distance
 
 
-def hopeless(moved: float, speed: float) -> bool:
-    """Whether a pull cannot lift a box any more, even if nothing holds it from now on.
+def hopeless(moved: float, speed: float, left: float) -> bool:
+    """Whether a pull will not lift a box any more.
+
+    It cannot if a free rise from now on were too short. It will not if the box, with the mean
+    acceleration that it has had, would reach a quarter of the threshold at most (``HARDLY``).
 
     Args:
-        moved: m, within the first ``HALF``.
+        moved: m, so far.
         speed: m/s, of its centre.
+        left: s, of the pull.
     """
-    seconds = task.LIFT_TIME - HALF
-    rise = (task.PICK_FORCE / task.MASS - task.GRAVITY) * seconds**2 / 2
-    return moved + speed * seconds + rise < task.LIFT_THRESHOLD
+    free = task.PICK_FORCE / task.MASS - task.GRAVITY
+    mean = speed / (task.LIFT_TIME - left)
+    freely, as_before = (moved + speed * left + a * left**2 / 2 for a in (free, mean))
+    return freely < task.LIFT_THRESHOLD or as_before < HARDLY * task.LIFT_THRESHOLD
 
 
 @cache
@@ -207,8 +219,9 @@ def make_physics(physics: PhysicsName | LocalPhysics) -> LocalPhysics:
     return TablePhysics(shared_table()) if physics == "table" else TablePhysics(held_down=1)
 
 
-def _digest(situation: Situation) -> np.uint64:
-    return np.uint64(digest_of(np.frombuffer(situation.key, np.int32)))
+def _inserted(array: np.ndarray, place: np.integer, value: int | np.integer) -> np.ndarray:
+    """What ``np.insert`` makes, in half the time."""
+    return np.concatenate((array[:place], array.dtype.type(value)[np.newaxis], array[place:]))
 
 
 @compiled(plain=True)
@@ -221,26 +234,70 @@ def find_distance(digests, micrometres, digest):
 
 @compiled(plain=True)
 def held_by_rule(key):
-    """Whether the boxes on top of the chosen one, one or two, lie on its middle, see ``MIDDLE``.
+    """Whether what lies on the chosen box, one box or two, holds it down for certain.
 
     The pull raises 1.04 boxes besides the chosen one. So one on its middle rises by 9 mm, and off
-    it, it tips aside; two on it hold it down even if their other ends lie on neighbours.
+    it, it tips aside, unless it stands between others; two on it hold it down even if their other
+    ends lie on neighbours. See ``MIDDLE`` and ``COVERED``.
 
     Args:
         key: the words of a situation's key, see ``write_key``.
     """
     first = 2 + key[1]
     first += (len(key) - first) % 6  # behind the sides
-    on_top = key[0] - 1
-    if on_top >= len(MIDDLE):
+    if key[0] - 1 >= HELD_DOWN or not _lies_within(key, first, MIDDLE, 1.0):
         return False
-    for axis in range(2):
+    return _lies_within(key, first, MIDDLE, MIDDLE) or _between_others(key, first)
+
+
+@compiled(plain=True)
+def _lies_within(key, first, along_x, along_y):
+    """Whether the common centre of the boxes on top is so near, and each one not too far.
+
+    Args:
+        key: the words of a situation's key.
+        first: the index of the chosen box's in it.
+        along_x, along_y: in half edges, of the common centre, at most.
+    """
+    on_top = key[0] - 1
+    for axis, middle in enumerate((along_x, along_y)):
         edge, total = key[first + 3 + axis], 0
         for box in range(1, on_top + 1):
             centre = key[first + 6 * box + axis]
             if 2 * abs(centre) > FARTHEST * edge:
                 return False
             total += centre
-        if 2 * abs(total) > MIDDLE[on_top] * on_top * edge:
+        if 2 * abs(total) > middle * on_top * edge:
             return False
     return True
+
+
+@compiled(plain=True)
+def _between_others(key, first):
+    """Whether boxes or side walls cover both sides of the chosen box, see ``COVERED``."""
+    depth, width, height = key[first + 3], key[first + 4], key[first + 5]
+    if width > FLAT * height:
+        return False
+    near = width / 2 + CONTACT_TOLERANCE / RESOLUTION  # its sides are so far from its centre
+    left = right = 0.0  # shares of its faces
+    for word in range(2 + key[1], first):
+        if abs(key[word]) <= near and key[word] < 0:
+            left = 1.0
+        elif abs(key[word]) <= near:
+            right = 1.0
+    for box in range(first + 6 * key[0], len(key), 6):
+        face = abs(key[box + 1]) - key[box + 4] / 2
+        x = _shared(key[box], key[box + 3], depth)
+        z = _shared(key[box + 2], key[box + 5], height)
+        if 0 < face <= near and x > 0 and z > 0:
+            if key[box + 1] < 0:
+                left += x * z
+            else:
+                right += x * z
+    return min(left, right) >= COVERED
+
+
+@compiled(plain=True)
+def _shared(centre, length, edge):
+    """The share of an edge around 0 that an interval covers; below 0 if it does not."""
+    return (min(centre + length / 2, edge / 2) - max(centre - length / 2, -edge / 2)) / edge
