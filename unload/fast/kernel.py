@@ -15,15 +15,21 @@ CHUNK = 32  # samples whose gradients are summed in single precision
 _BLOCK = 64  # features handled together: loops of constant length become vector instructions
 _LANES = 16  # features in the longest vector: few enough to keep their sums in registers
 
+# Which item is the lowest and which is the highest matters after the ReLU alone, where all negative
+# values are 0. So items are compared by keys: the bits of a value, read as an integer, whose lowest
+# bits are the item's number. In the order of keys the negative values come first, in reverse, then
+# the positive ones: -0.5, -2, 1, 3. The lowest key is that of -0.5, which becomes 0 like -2, and
+# the highest that of 3.
+#
 # A block holds all that is known of _BLOCK features: rows of _BLOCK numbers, one feature a column.
 #
 #     rows    name              what, for each feature
 #      0- 3   _WX … _BIAS       the extractor's weights of x, y and z, and its bias
-#      4- 5   _LOW, _LOW2       keys of the lowest value, and of the lowest but one
-#      6- 7   _HIGH, _HIGH2     keys of the highest value, and of the highest but one
+#      4- 5   _LOW, _LOW2       the lowest key, and the lowest but one
+#      6- 7   _HIGH, _HIGH2     the highest key, and the highest but one
 #      8-23   _MEAN … _HIGHEST  inputs x, y, z and 1: their mean, the chosen item's, those of the
 #                               lowest and of the highest item; groups of four rows each
-#     24      _SLACK            values closer than this may be in the wrong order
+#     24      _SLACK            closer than this to 0 or another, a value's order is unsure
 #     25-32   _SCORE, _FEATURE  the scorer's weights, and the features: of the chosen item, the
 #                               minimum, the maximum and the mean; four rows each
 #     33      _PART             what they add to the value before tanh
@@ -41,7 +47,7 @@ _GRADIENT, _SCORE_GRADIENT, _SIZE = 34 * _BLOCK, 38 * _BLOCK, 42 * _BLOCK
 _X, _Y, _Z, _CONSTANT = 0, _BLOCK, 2 * _BLOCK, 3 * _BLOCK
 
 _FRACTION = 0x7FFFFF  # the bits of a float32 after its sign and exponent
-_ABOVE_ALL, _BELOW_ALL = 0x7FFFFFFF, -0x80000000  # the largest and the smallest int32: see ``_key``
+_ABOVE_ALL, _BELOW_ALL = 0x7FFFFFFF, -0x80000000  # as keys: the largest and the smallest int32
 _ZERO, _ONE = np.float32(0), np.float32(1)
 
 
@@ -102,7 +108,6 @@ def add_chunks(
     n, items = len(bias), observations.shape[1]
     samples = observations.reshape(len(observations), 3 * items)  # a sample's inputs in each row
 
-    # A key is a value whose lowest bits are the item's number, so that to sort keys sorts items.
     bits = 0  # of an item's number
     while items > 1 << bits:
         bits += 1
@@ -204,7 +209,7 @@ def _start_chunk(largest, precision, block):
 
 @compiled
 def _reduce_items(inputs, items, mask, block):
-    """Read all items: sums of the active ones, keys of the two lowest and the two highest.
+    """Read all items: sums of the active ones, the two lowest and the two highest keys.
 
     Most of the time is spent here. There are no branches, so that ``_LANES`` features go side by
     side.
@@ -263,14 +268,7 @@ def _active(value):
 
 @compiled(forceinline=True)
 def _key(value, item, mask):
-    """The value's bits, the lowest of them replaced by the item's number: an int32.
-
-    Keys of positive values are in the order of the values, and all below them are the keys of
-    negative values, in reverse order: by their keys, -0.5, -2, 1 and 3 stand in this order. So the
-    lowest and the highest key are of what the ReLU needs. Here they are those of -0.5, which
-    becomes 0, and of 3. Of 1 and 3 alone they are those of 1 and 3; of -0.5 and -2 alone both are
-    negative, and whatever is negative becomes 0.
-    """
+    """The value's bits, the lowest of them replaced by the item's number: an int32."""
     return np.int32(np.int32(_bits(value) & ~mask) | item)
 
 
@@ -302,14 +300,21 @@ def _inputs(x, key, mask):
 
 @compiled(forceinline=True)
 def _lowest_is_sure(f, block):
-    """Some item is negative, or the lowest is positive and clearly below all others."""
+    """Whether the item of the lowest key is the lowest after the ReLU for certain.
+
+    So it is if its value is clearly below 0, or clearly above 0 and clearly below all others.
+    """
     low, low2, slack = block[_LOW + f], block[_LOW2 + f], block[_SLACK + f]
     return (low < -slack) | ((low > slack) & (low2 - low > slack))
 
 
 @compiled(forceinline=True)
 def _highest_is_sure(f, block):
-    """All items are negative, or the highest is positive and clearly above all others."""
+    """Whether the item of the highest key is the highest after the ReLU for certain.
+
+    So it is if its value is clearly above 0 and clearly above all others. Where all are negative,
+    any item will do, if the one of the lowest key, which is nearest to 0, is clearly below 0.
+    """
     low, high, slack = block[_LOW + f], block[_HIGH + f], block[_SLACK + f]
     negative = (high < _ZERO) & (low < -slack)
     return negative | ((high > slack) & (high - block[_HIGH2 + f] > slack))
