@@ -81,11 +81,10 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
 
     Args:
         num_envs: number of environments.
-        autoreset_mode: when the next episode begins in an environment whose own has ended:
-            ``SAME_STEP``, ``NEXT_STEP``, in which the action is not used and the reward is 0, as
-            most of Gymnasium's vector wrappers want it, or ``DISABLED``, by the caller's
-            ``reset(options={"reset_mask": mask})``. Gymnasium takes ``vector_kwargs`` only for its
-            own ones: ``make_vec(id, num_envs, autoreset_mode=AutoresetMode.NEXT_STEP)``.
+        autoreset_mode: when the next episode begins in an environment whose own has ended, see
+            ``step``; most of Gymnasium's vector wrappers want ``NEXT_STEP``. Gymnasium takes
+            ``vector_kwargs`` only for its own ones:
+            ``make_vec(id, num_envs, autoreset_mode=AutoresetMode.NEXT_STEP)``.
         equalize, ties, max_picks, position_noise: as for the single environment.
         render_mode: None; there are no pictures of vector environments.
 
@@ -162,13 +161,19 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
             if seeds[env] is not None or rngs[env] is None:
                 rngs[env], _ = seeding.np_random(seeds[env])
         self._begin(chosen, rngs, **options)
+        self._state = "running"
         return self._copy_observations(), _flagged(self._infos(), chosen)
 
     def step(self, actions: np.ndarray):
         """Pick row ``actions[i]``, (num_envs,) int, in environment i.
 
-        Where the next episode begins in this step, the observation and infos are the reset's. With
-        ``SAME_STEP``, ``infos["final_obs"]`` and ``infos["final_info"]`` hold the last ones then.
+        Where an episode ends, the next one begins by ``autoreset_mode``:
+
+            SAME_STEP  at once; ``infos["final_obs"]`` and ``["final_info"]`` hold the last ones
+            NEXT_STEP  in the next step, whose action is not used there, and whose reward is 0
+            DISABLED   by the caller's ``reset(options={"reset_mask": mask})``, before another step
+
+        Where it begins in this step, the observation and infos are the reset's.
         """
         self._check_started()
         # Where an episode has ended in an earlier step, it waits for a reset. With SAME_STEP, none.
@@ -183,7 +188,6 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         self._picks += 1
 
         # NEXT_STEP: where one waits, the next one begins, and the action has not counted.
-        fresh = waiting
         if waiting.any():
             rewards[waiting] = 0
             self._begin(waiting, self._rngs)
@@ -194,10 +198,11 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         final: dict[str, Any] = {}
         ended = terminations | truncations
         if ended.any() and self.autoreset_mode is AutoresetMode.SAME_STEP:
-            final, fresh = self._final_infos(ended, picked), ended
+            final = self._final_infos(ended, picked)
             self._begin(ended, self._rngs)
 
         # The infos are a reset's where there was one, and the pick's elsewhere.
+        fresh = ended if self.autoreset_mode is AutoresetMode.SAME_STEP else waiting
         infos = _flagged(self._infos(), np.ones(self.num_envs, bool))
         if not fresh.all():  # a reset has no infos about a pick
             infos |= _flagged(picked, ~fresh)
@@ -221,12 +226,15 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         return self._infos()["action_mask"].astype(bool)
 
     def _begin(self, where: np.ndarray, rngs: list[np.random.Generator], **options) -> None:
-        """Begin an episode in some environments, (num_envs,) bool, by the generators of all."""
+        """Begin an episode in some environments, (num_envs,) bool, by the generators of all.
+
+        Whoever calls this sets the state to ``"running"`` when all is done.
+        """
         self._state = "broken off"
         self._picks[where] = 0
         envs = np.flatnonzero(where)
         self._fill(envs, [rngs[env] for env in envs], **options)
-        self._rngs, self._state = rngs, "running"
+        self._rngs = rngs
 
     def close_extras(self, **kwargs) -> None:
         """Free what the environments hold."""
@@ -306,6 +314,7 @@ class PickingEnv(EpisodeEnv):
         options = check_options(options, self._envs.options)
         super().reset(seed=seed)
         self._envs._begin(np.ones(1, bool), [self.np_random], **options)
+        self._envs._state = "running"
         return self._envs._copy_observations()[0], _first(self._envs._infos())
 
     def step(self, action: int):
