@@ -11,7 +11,7 @@ import numpy as np
 
 from unload import task
 from unload.fast.ranking import features, rank, remove, replace
-from unload.physics.situation import digest_of, find_movers, key_length, write_key
+from unload.physics.situation import digest_of, find_movers, find_touching, key_length, write_key
 from unload.physics.table import FREE_LIFT, UNKNOWN, find_distance, held_by_rule
 from unload.support.compiled import compiled
 
@@ -132,16 +132,16 @@ def look_up(containers, actions, held_down, ruled, digests, micrometres):
 
         # Free boxes and those under many others need no table, see TablePhysics.
         starts, links = containers.starts[env], containers.links[env]
-        present, right = containers.present[env], containers.widths[env]
+        present = containers.present[env]
         dynamic = find_movers(starts, links, present, items[env], members, held_down + 1)
         on_top = dynamic - 1
         if on_top == 0 or on_top >= held_down:
             distances[env] = FREE_LIFT if on_top == 0 else 0.0
             continue
 
-        words = write_key(
-            starts, links, present, containers.geometry[env], right, members, dynamic, key
-        )
+        count = find_touching(starts, links, present, members, dynamic)
+        geometry, right = containers.geometry[env], containers.widths[env]
+        words = write_key(geometry, right, members[:count], dynamic, key)
         micrometre_count = find_distance(digests, micrometres, digest_of(key[:words]))
         if micrometre_count != UNKNOWN:
             distances[env] = micrometre_count / 1e6

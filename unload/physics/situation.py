@@ -35,7 +35,14 @@ class Situation:
 
     @cached_property
     def key(self) -> bytes:
-        """Equal for equal situations: the words that ``write_key`` writes."""
+        """Equal for equal situations: int32 words, all lengths in micrometres.
+
+        They are how many boxes can move, 1 if there is a floor and else 0, its z if there is one, y
+        of each side wall, and the six numbers of each box. For example, a box of 0.6 × 0.5 × 0.4 m
+        that stands alone on the floor, at the left side wall, has::
+
+            1, 1, -200000, -250000, 0, 0, 0, 600000, 500000, 400000
+        """
         floor = () if self.floor is None else (self.floor,)
         head = np.array([self.dynamic, len(floor), *floor, *self.sides], dtype=np.int32)
         return head.tobytes() + self.boxes.tobytes()
@@ -79,7 +86,7 @@ class Surroundings:
 
 @compiled(plain=True)
 def key_length(boxes):
-    """The greatest number of words in the key of a situation of so many boxes."""
+    """The greatest number of words in the key of a situation of so many boxes, with two sides."""
     return 5 + 6 * boxes
 
 
@@ -108,26 +115,17 @@ def find_movers(starts, links, present, item, members, most):
 
 
 @compiled(plain=True)
-def write_key(starts, links, present, geometry, right, members, dynamic, key):
-    """Write the words of ``Situation.key``; return how many there are.
-
-    They are how many boxes move, 1 if there is a floor and else 0, its z, up to two sides, and six
-    words for each box.
+def find_touching(starts, links, present, members, dynamic):
+    """How many boxes decide a lift: those that it moves, and what they stand on or may rub against.
 
     Args:
         starts, links, present: as for ``find_movers``.
-        geometry: (n, 6) float64, centre and edge lengths of each box in m.
-        right: y of the right side wall in m.
-        members: (n,) int32, begins with the ``dynamic`` boxes of ``find_movers``, which are
-            sorted here; what they touch besides is written behind them.
+        members: (n,) int32, begins with the ``dynamic`` boxes of ``find_movers``. Those on top are
+            sorted here, and the boxes found are written behind them, sorted, too.
         dynamic: their number.
-        key: int32, written; ``key_length`` says how much room it needs.
     """
-    item = members[0]
     for end in range(1, dynamic):  # numba's own sort takes a second more to compile
         _insert(members, 1, end, members[end])
-
-    # What the moving boxes stand on or may rub against; the rest has no influence.
     count = dynamic
     for mover in range(dynamic):
         box = members[mover]
@@ -135,12 +133,26 @@ def write_key(starts, links, present, geometry, right, members, dynamic, key):
             for link in range(starts[kind, box], starts[kind, box + 1]):
                 if present[links[link]] and not _holds(members, count, links[link]):
                     count = _insert(members, dynamic, count, links[link])
+    return count
 
+
+@compiled(plain=True)
+def write_key(geometry, right, members, dynamic, key):
+    """Write the words of ``Situation.key``; return how many there are.
+
+    Args:
+        geometry: (n, 6) float64, centre and edge lengths of each box in m.
+        right: y of the right side wall in m.
+        members: (k,) int32, the boxes that ``find_touching`` found, no more.
+        dynamic: how many of them a lift moves.
+        key: int32, written; ``key_length`` says how much room it needs.
+    """
     # The floor matters to the chosen box alone, a side wall to each box that moves.
     lowest, highest = np.inf, -np.inf
     for mover in range(dynamic):
         y, width = geometry[members[mover], 1], geometry[members[mover], 4]
         lowest, highest = min(lowest, y - width / 2), max(highest, y + width / 2)
+    item = members[0]
     x, y, z = geometry[item, 0], geometry[item, 1], geometry[item, 2]
     key[0], key[1], words = dynamic, 0, 2
     if z - geometry[item, 5] / 2 <= CONTACT_TOLERANCE:
@@ -153,8 +165,7 @@ def write_key(starts, links, present, geometry, right, members, dynamic, key):
         words += 1
 
     # Relative to the item before rounding: equal situations are equal wherever they are.
-    for number in range(count):
-        box = members[number]
+    for box in members:
         for axis, origin in enumerate((x, y, z)):
             key[words + axis] = _micrometres(geometry[box, axis] - origin)
             key[words + 3 + axis] = _micrometres(geometry[box, 3 + axis])
@@ -170,22 +181,30 @@ def situation_in(
     right: float,
     item: int,
 ) -> Situation:
-    """The situation of ``item`` in a container given by arrays, see ``write_key``."""
+    """The situation of ``item`` in a container, see ``find_movers`` and ``write_key``."""
     members = np.empty(len(present), np.int32)
     key = np.empty(key_length(len(present)), np.int32)
     dynamic = find_movers(starts, links, present, item, members, len(members))
-    words = write_key(starts, links, present, geometry, right, members, dynamic, key)
+    count = find_touching(starts, links, present, members, dynamic)
+    words = write_key(geometry, right, members[:count], dynamic, key)
     key = key[:words].copy()
-
-    # What stands between its head and the boxes, six words each, are the floor and the sides.
-    first = 2 + key[1]
-    side_count = (len(key) - first) % 6
+    sides, boxes = parts_of_key(key)
     return Situation(
-        boxes=key[first + side_count :].reshape(-1, 6),
+        boxes=key[boxes:].reshape(-1, 6),
         dynamic=int(key[0]),
         floor=int(key[2]) if key[1] else None,
-        sides=tuple(key[first : first + side_count].tolist()),
+        sides=tuple(key[sides:boxes].tolist()),
     )
+
+
+@compiled(plain=True)
+def parts_of_key(key):
+    """Where in a situation's key its side walls begin, and where its boxes, see ``Situation.key``.
+
+    Each box takes six words, and there are two side walls at most.
+    """
+    sides = 2 + key[1]
+    return sides, sides + (len(key) - sides) % 6
 
 
 @compiled(plain=True)

@@ -20,7 +20,7 @@ from unload import task
 from unload.load.boxes import CONTACT_TOLERANCE
 from unload.physics.bullet import DAMPING, ENGINES, TIME_STEP, engine_of
 from unload.physics.local import LocalPhysics, settings_of_lifts
-from unload.physics.situation import RESOLUTION, Situation
+from unload.physics.situation import RESOLUTION, Situation, parts_of_key
 from unload.support import checks, files
 from unload.support.compiled import compiled
 
@@ -241,10 +241,9 @@ def held_by_rule(key):
     ends lie on neighbours. See ``MIDDLE`` and ``COVERED``.
 
     Args:
-        key: the words of a situation's key, see ``write_key``.
+        key: the words of a situation's key, see ``Situation.key``.
     """
-    first = 2 + key[1]
-    first += (len(key) - first) % 6  # behind the sides
+    _, first = parts_of_key(key)
     if key[0] - 1 >= HELD_DOWN or not _lies_within(key, first, MIDDLE, 1.0):
         return False
     return _lies_within(key, first, MIDDLE, MIDDLE) or _between_others(key, first)
@@ -280,10 +279,11 @@ def _between_others(key, first):
         return False
     near = width / 2 + CONTACT_TOLERANCE / RESOLUTION  # its sides are so far from its centre
     left = right = 0.0  # shares of its faces
-    for word in range(2 + key[1], first):
-        if abs(key[word]) <= near and key[word] < 0:
+    sides, _ = parts_of_key(key)
+    for side in key[sides:first]:
+        if abs(side) <= near and side < 0:
             left = 1.0
-        elif abs(key[word]) <= near:
+        elif abs(side) <= near:
             right = 1.0
     for box in range(first + 6 * key[0], len(key), 6):
         face = abs(key[box + 1]) - key[box + 4] / 2
