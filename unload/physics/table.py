@@ -28,15 +28,17 @@ PhysicsName = Literal["local", "places", "table"]
 
 UNKNOWN = -1  # in place of a distance that is not in the table
 HELD_DOWN = 3  # so many boxes on top hold a box down
-# One or two hold it down, too, if they lie on its middle: if their common centre is no farther from
-# its own, along x and y, than this share of the half edge; and none farther than ``FARTHEST``.
+# One or two hold it down, too, if they lie on its middle. Along x and along y, let 0 be its centre
+# and 1 its edge: so far out may the common centre of those on top be, and the centre of each one.
 MIDDLE = 0.5
 FARTHEST = 1.5
-# A box between two others cannot tip sideways. So along y the common centre of what lies on it may
-# be anywhere above it. The others cover this share of its left and of its right face, and it is not
-# flat: a box that is wider than so many heights tips within the gaps.
-COVERED, FLAT = 0.5, 4.0
-HARDLY = 0.25  # of the threshold
+# A box between two others cannot tip sideways. So along y the common centre of those on top may be
+# anywhere from edge to edge. The box counts as between others if they cover at least this share of
+# its left and of its right face, and if it is at most so many times as wide as high: a flatter one
+# tips within the gaps.
+COVERED = 0.5
+FLAT = 4.0
+HARDLY = 0.25  # of the threshold: a pull that would not even lift so far is given up
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
 _ARRAYS = {"digests", "micrometres", "settings"}  # of a file
 
@@ -255,8 +257,8 @@ def _lies_within(key, first, along_x, along_y):
 
     Args:
         key: the words of a situation's key.
-        first: the index of the chosen box's in it.
-        along_x, along_y: in half edges, of the common centre, at most.
+        first: the index in it where the boxes begin, with the chosen one.
+        along_x, along_y: how far out the common centre may be, as for ``MIDDLE``.
     """
     on_top = key[0] - 1
     for axis, middle in enumerate((along_x, along_y)):
