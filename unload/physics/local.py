@@ -65,12 +65,8 @@ class LocalPhysics:
             for row, (place, size) in enumerate(zip(places, sizes)):
                 mass = task.MASS if row < situation.dynamic else 0.0
                 bodies.append(world.add_box(place, size, mass))
-            if situation.floor is not None:
-                height = situation.floor * RESOLUTION
-                bodies.append(world.add_box((0, 0, height - 0.5), (9, 9, 1), 0))
-            for side in situation.sides:
-                outwards = np.sign(side) * 0.5
-                bodies.append(world.add_box((0, side * RESOLUTION + outwards, 0), (9, 1, 9), 0))
+            for place, size in situation.floor_and_sides():
+                bodies.append(world.add_box(place, size, 0.0))
             return round(world.pull(bodies[0], hopeless=hopeless), 6)
         finally:  # also when interrupted: what stays behind would be in the way of the next lift
             for body in reversed(bodies):

@@ -14,7 +14,6 @@ from unload.physics.bullet import ASKED_EVERY, DAMPING, FRICTION, SETTINGS, TIME
 from unload.physics.situation import RESOLUTION, Situation
 
 STEP = TIME_STEP / 2  # s; its own contacts are soft, and a shorter step makes them firm enough
-HALF_THICKNESS, HALF_WIDTH = 0.5, 4.5  # m, of the floor and the side walls
 
 
 def settings() -> dict:
@@ -74,14 +73,9 @@ def _described(situation: Situation) -> str:
         else:
             parts.append(f'<geom type="box" {place} {size}/>')
 
-    if situation.floor is not None:
-        at = _text("pos", (0, 0, situation.floor * RESOLUTION - HALF_THICKNESS))
-        size = _text("size", (HALF_WIDTH, HALF_WIDTH, HALF_THICKNESS))
-        parts.append(f'<geom type="box" {at} {size}/>')
-    for side in situation.sides:
-        at = _text("pos", (0, side * RESOLUTION + np.sign(side) * HALF_THICKNESS, 0))
-        size = _text("size", (HALF_WIDTH, HALF_THICKNESS, HALF_WIDTH))
-        parts.append(f'<geom type="box" {at} {size}/>')
+    for centre, edges in situation.floor_and_sides():
+        place, size = _text("pos", centre), _text("size", np.array(edges) / 2)
+        parts.append(f'<geom type="box" {place} {size}/>')
 
     # MuJoCo takes the larger friction of two bodies, Bullet their product.
     return f"""<mujoco>

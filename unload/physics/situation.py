@@ -57,6 +57,16 @@ class Situation:
         """Number of boxes that rest on the chosen one, directly or over others."""
         return self.dynamic - 1
 
+    def floor_and_sides(self) -> list[tuple[tuple[float, float, float], tuple[int, int, int]]]:
+        """Fixed boxes for the floor and the side walls: centre and edge lengths of each, in m."""
+        fixed = []
+        if self.floor is not None:
+            fixed.append(((0.0, 0.0, self.floor * RESOLUTION - 0.5), (9, 9, 1)))
+        for side in self.sides:
+            outside = side * RESOLUTION + (0.5 if side > 0 else -0.5)
+            fixed.append(((0.0, outside, 0.0), (9, 1, 9)))
+        return fixed
+
 
 class Surroundings:
     """The situations of all boxes of a load, while it is unloaded.
