@@ -47,7 +47,11 @@ def settle(
 
 
 def _bottoms(low: np.ndarray, sizes: np.ndarray, tolerance: float) -> np.ndarray:
-    """The height of each bottom, (n,) float64, once each box lies on the highest one below it."""
+    """The height of each bottom, (n,) float64, once each box lies on the highest one below it.
+
+    For example, B lies on A, which is 0.5 m high. If they were measured from 0.002 and 0.497 m on,
+    A goes down to the floor, and B up to 0.5 m.
+    """
     high = low + sizes
     bottom, top = low[:, 2].copy(), high[:, 2].copy()
     order = np.argsort(low[:, 2], kind="stable")  # from the floor upwards
@@ -67,7 +71,10 @@ def _bottoms(low: np.ndarray, sizes: np.ndarray, tolerance: float) -> np.ndarray
 def _rows(axis: int, low, high, start, end, tolerance: float) -> Rows:
     """The boxes along x or y, from the wall on, each with the ones that stand before it in a row.
 
-    Measured corners say what stands before what, settled ones what shares a height or a depth.
+    Measured corners say what stands before what, settled ones what shares a height or a depth. For
+    example, A reaches from 0 to 1 m along x, and B from 0.996 to 2 m. If both stand on the floor,
+    the rows along x are [(A, []), (B, [A])]; if B stands on the height of A's top, or beside A,
+    they are [(A, []), (B, [])].
     """
     rows, order = [], np.argsort(low[:, axis] + high[:, axis], kind="stable")
     low, high, start, end = (corners[order] for corners in (low, high, start, end))
