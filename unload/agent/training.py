@@ -270,7 +270,7 @@ def train(
                 run = Training(config, stack, change)
                 with closing(run.rollout):
                     folder.restore(run)
-                    _finish(run, folder, progress, callback, signals)
+                    _train_to_end(run, folder, progress, callback, signals)
     return _result(folder, config)
 
 
@@ -289,7 +289,7 @@ def _result(folder: RunFolder, config: TrainConfig) -> TrainResult:
     return TrainResult(load_policy(folder.policy, network), curve)
 
 
-def _finish(
+def _train_to_end(
     run: Training,
     folder: RunFolder,
     progress: bool | TextIO,
