@@ -1,7 +1,8 @@
 """The system on one page: the task of the paper, and masked DQN, which learns it.
 
 Read this first. It is written to be understood, and looks at all boxes at each pick. ``env``,
-``fast`` and ``agent`` do the same faster, and the tests hold them equal to this page by bits.
+``fast`` and ``agent`` do the same faster, and the tests hold them equal to this page by bits, the
+training with ``fused_update=False``, because the fused update rounds otherwise.
 ``python -m unload.plain`` trains on positions, in half a minute.
 """
 
@@ -219,8 +220,10 @@ def masked_dqn(envs, network, steps, seeds, gamma=0.0, mask=True, batch_size=64,
     replay, losses, means = {}, [], []  # replay: the last `size` picks by their slots
     seen = envs.reset(seed=seeds[0])
     for step in range(steps):
+        # A batch is drawn before the step's picks and learned from after them: so ``Training.step``
+        # can compute an update while the environments step, and the order of draws is the same.
         learns = len(replay) >= batch_size
-        slots = rng.integers(len(replay), size=batch_size) if learns else []  # before the picks
+        slots = rng.integers(len(replay), size=batch_size) if learns else []
         epsilon = max(0, 1 - step / (steps / 2))  # 0 from half of the run on (Sec. IV-B)
         picks, seen = pick(choose, envs, network, seen, epsilon, mask, rng)
         if learns:
