@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from unload import task
-from unload.load.substacks import CELL, DEPTH, PACKAGES
+from unload.load.substacks import CELL, PACKAGES, WALLS
 
 REAR = 4.0  # m, x of the wall behind the heap: the last 3 m of the container are played
 DOOR = float(task.CONTAINER[0])  # m, x of the entrance
@@ -79,4 +79,5 @@ class Heap:
 
 def package_sizes(packages: np.ndarray) -> np.ndarray:
     """(n, 3) float64, m: depth, width and height of packages as in the neat loads."""
-    return np.column_stack([np.full(len(packages), DEPTH), PACKAGES[packages] * CELL])
+    depths = np.full(len(packages), task.CONTAINER[0] / WALLS)
+    return np.column_stack([depths, PACKAGES[packages] * CELL])

@@ -17,7 +17,6 @@ CELLS_HIGH = 10  # of a row of substacks
 CELL = task.CONTAINER[1] / CELLS_WIDE  # m
 ROWS = 3  # bottom, mid, top
 WALLS = 12  # not in the paper: gives 938 ± 40 items, nearly always in its range of 800–1000
-DEPTH = task.CONTAINER[0] / WALLS  # m, of each box of 12 walls
 
 # Width and height of packages 0–12, in cells (Fig. 3).
 PACKAGES = np.array(
@@ -74,11 +73,12 @@ def build_load(variants: np.ndarray) -> Load:
     variants = checks.integer_array("variants", variants, (None, None, len(COLUMNS)), 2)
     if not variants.size:
         raise ValueError(f"variants has shape {variants.shape}; expected a wall and a row at least")
-    counts, cells = (known[np.arange(len(COLUMNS)), variants] for known in (_COUNTS, _CELLS))
-    filled = np.arange(cells.shape[3]) < counts[..., np.newaxis]
-    walls, rows, _, _ = np.nonzero(filled)
+    columns = np.arange(len(COLUMNS))
+    counts, cells = _COUNTS[columns, variants], _CELLS[columns, variants]  # (walls, rows, 4, …)
+    filled = np.arange(cells.shape[3]) < counts[..., np.newaxis]  # (walls, rows, 4, m)
+    walls, rows, _, _ = np.nonzero(filled)  # (n,) each, as of all that follows
     packages, left, low = cells[filled].T
-    # In walls and cells, and in m: a wall is as deep as each of its boxes.
+    # In walls and cells, (n, 3), and in m: a wall is as deep as each of its boxes.
     edges = np.insert(PACKAGES, 0, 1, axis=1)[packages]
     units = np.array([task.CONTAINER[0] / (walls[-1] + 1), CELL, CELL])
     positions = (np.column_stack([walls, left, low + rows * CELLS_HIGH]) + edges / 2) * units

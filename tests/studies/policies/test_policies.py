@@ -16,7 +16,7 @@ from studies.results import read_provenance, read_table
 from unload import PEQNetwork, TrainConfig, evaluate, load_policy, policies, task
 from unload.env.observation import nearest
 from unload.load.boxes import Load
-from unload.load.substacks import CELL, CELLS_HIGH, CELLS_WIDE, DEPTH, PACKAGES, stack_load
+from unload.load.substacks import CELL, CELLS_HIGH, CELLS_WIDE, PACKAGES, WALLS, stack_load
 from unload.physics.situation import Surroundings
 from unload.support import files
 
@@ -58,7 +58,8 @@ def test_a_load_of_another_scale_fills_what_it_can(rng, scale):
     assert len(np.unique(load.walls)) == walls
     # No further substack would fit.
     assert width + 10 * CELL * scale > 2.5 and height + CELLS_HIGH * CELL * scale > 2.5
-    expected = np.column_stack([np.full(len(load), DEPTH), PACKAGES[load.packages] * CELL])
+    depths = np.full(len(load), task.CONTAINER[0] / WALLS)
+    expected = np.column_stack([depths, PACKAGES[load.packages] * CELL])
     assert load.sizes == pytest.approx(scale * expected)
 
 
