@@ -179,8 +179,9 @@ def _play(
     summaries = []
     for count, reward, failed in zip(picks, np.transpose(rewards), np.transpose(deadlocked)):
         reward, failed = reward[:count], failed[:count]
-        ends = np.flatnonzero(np.diff(failed, prepend=0, append=0))  # of deadlocks, and starts
-        longest = (ends[1::2] - ends[::2]).max(initial=0)
+        # Where a deadlock starts, where it ends, where the next one starts, and so on.
+        changes = np.flatnonzero(np.diff(failed, prepend=0, append=0))
+        longest = (changes[1::2] - changes[::2]).max(initial=0)
         summaries.append((success_rate(reward), (reward > 0).sum(), failed.mean(), longest))
     frame = pd.DataFrame(
         summaries, columns=["success_rate", "unloaded", "deadlocked", "longest_deadlock"]

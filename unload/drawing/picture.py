@@ -225,7 +225,8 @@ def back_to_front(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     groups = slabs(low[:, 0] + OVERLAP, high[:, 0])
     for group in range(groups.max(initial=-1) + 1):
         left = np.flatnonzero(groups == group)
-        # Whether box i ends where box j begins, or before, on each axis: (n, n, 3).
+        # apart[i, j, axis]: box i ends where box j begins, or before. behind[i, j]: a plane has box
+        # i on its far side and box j on its near side, so that i is drawn first.
         apart = high[left][:, None] <= low[left] + OVERLAP
         behind: np.ndarray = apart[..., 0] | apart[..., 2] | apart[..., 1].T
         behind &= ~behind.T  # separated both ways: neither hides the other
