@@ -7,9 +7,11 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.vector import AutoresetMode
 
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, make_env
 from unload import ContainerEnv, HighestItemEnv, stack_load
+from unload.env import base
 from unload.env.highest_item import HighestItemVectorEnv
 from unload.env.vector import ContainerVectorEnv
 from unload.physics.full import FullPhysics
@@ -132,6 +134,17 @@ def test_a_call_whose_stack_fails_needs_a_reset(failing):
             call()
     assert_same(env.reset(seed=0), other.reset(seed=0))
     assert_same(env.step([0]), other.step([0]))
+
+
+def test_a_step_that_stops_after_the_next_episode_has_begun_needs_a_reset(set_in):
+    envs = HighestItemVectorEnv(1, autoreset_mode=AutoresetMode.NEXT_STEP, max_picks=1)
+    envs.reset(seed=0)
+    envs.step([0])
+    set_in(base, _flagged=Mock(side_effect=KeyboardInterrupt))  # is called after it
+    with pytest.raises(KeyboardInterrupt):
+        envs.step([0])
+    with pytest.raises(ResetNeeded, match="the episode is broken off; call reset first"):
+        envs.action_masks()
 
 
 def test_results_are_no_views_of_what_the_environments_hold():
