@@ -99,7 +99,7 @@ def test_names_are_where_type_checkers_find_them():
     found = {}
     exec(compile(ast.Module(typed.body, []), "imports", "exec"), found)
     del found["__builtins__"]
-    assert found.keys() == set(unload.__all__) - {"__version__"} == unload._PLACES.keys()
+    assert found.keys() == set(unload.__all__) - {"__version__"} == unload._MODULES.keys()
     assert all(getattr(unload, name) is value for name, value in found.items())
     # Without ``as`` the names would not be exported for a strict type checker.
     assert all(name.asname == name.name for line in typed.body for name in line.names)

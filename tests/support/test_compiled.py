@@ -55,12 +55,13 @@ def tripled(number):
     return number * np.uint64(3)
 
 
-def test_a_plain_function_is_compiled_as_soon_as_numba_is_there(monkeypatch):
+def test_a_plain_function_is_compiled_as_soon_as_another_one_is(monkeypatch):
     """Until then integers wrap as they do in compiled code; numba's settings stay the user's."""
     function, number, before = Compiled(tripled, True, {}), np.uint64(2**63), numba.config.CACHE_DIR
-    with monkeypatch.context() as patch:
-        patch.delitem(sys.modules, "numba")
-        assert function(number) == 2**63 and "dispatcher" not in vars(function)
+    monkeypatch.setattr(Compiled, "any_compiled", False)
+    assert function(number) == 2**63 and "dispatcher" not in vars(function)
+    other = Compiled(tripled, False, {})
+    assert other(number) == 2**63 and Compiled.any_compiled
     assert function(number) == 2**63 and "dispatcher" in vars(function)
     assert numba.config.CACHE_DIR == before
 
