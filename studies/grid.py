@@ -142,11 +142,6 @@ def train_grid(grid: Grid, cells: Sequence[str] | None = None, n_jobs: int = -1)
     return kept
 
 
-def published_runs(record: Mapping[str, Any]) -> int:
-    """How many runs are published, by the provenance: some may have been taken out since."""
-    return record.get("runs kept", record.get("runs", 0))
-
-
 def _published_names(grid: Grid) -> list[str]:
     """The names of all published runs, whatever trained them."""
     path = paths.DATA / f"{grid.name}.csv"
