@@ -177,6 +177,7 @@ def _published(grid: Grid, fingerprint: str) -> dict[str, tuple[Greedy | None, p
 
 def _publish(grid: Grid, kept: Path, fingerprint: str) -> None:
     """Publish the finished runs in ``kept`` beside those that are published and still the same."""
+    # Read again, because others may have been published while these were trained.
     configs, runs, records = grid.configs(), _published(grid, fingerprint), []
     old = len(runs)
     # What was trained here is read back from the folders of the runs, whenever that was.

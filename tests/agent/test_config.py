@@ -10,7 +10,7 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from unload import ContainerEnv, TrainConfig, train
-from unload.agent.config import ENVS, EXPLORATION_FRACTION
+from unload.agent.config import _CHECKS, ENVS, EXPLORATION_FRACTION
 from unload.checkpoint.settings import settings_of_run
 from unload.env.vector import ContainerVectorEnv
 from unload.physics.bullet import ENGINES
@@ -137,3 +137,7 @@ def test_the_physics_in_the_docstring_trains(full_load, tmp_path, monkeypatch):
     free = ~full_load.covered(np.ones(len(full_load), bool))[envs.visible[1]]
     wide = full_load.sizes[envs.visible[1], 1] > 0.4 + 1e-6
     assert np.array_equal(envs.liftable()[1], free & ~wide) and (free & wide).any()
+
+
+def test_each_field_is_checked():
+    assert list(_CHECKS) == [field.name for field in fields(TrainConfig)]
