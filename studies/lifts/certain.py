@@ -34,16 +34,16 @@ PARTS = {"bounds": (1_100_000, 100), "drawn anew": (1_500_000, 600)}
 PER_LOAD = 25  # lifts of a load, at most
 ASKED = 0.2  # share of the failing picks that are asked about
 # Besides the families: boxes of any proportions, one or two on another, which stands alone or not.
-STACKS = ("made-up stacks", "made-up stacks between others")
+STACKS = ("made-up stacks", "made-up stacks between others", "made-up bridges")
 EDGES = (0.05, 1.5)  # m, of boxes of these stacks
 MAX_OFFSET = 1.2  # half edges, their common centre
 COLUMNS = [
     "part", "family", "on_top", "common", "farthest", "answer", *ENGINES,
     *(f"table_{engine}" for engine in ENGINES),
 ]  # fmt: skip
-BOUNDS = ("middle", "farthest", "covered", "flat", "hardly")  # see ``physics.table``
+BOUNDS = ("middle", "covered", "flat", "hardly")  # see ``physics.table``
 ANSWERS = (
-    "three or more on top", "on its middle", "between others", "given up early",
+    "three or more on top", "on its middle", "side by side", "between others", "given up early",
     "simulated to the end",
 )  # fmt: skip
 
@@ -121,7 +121,7 @@ def over_middle(frame: pd.DataFrame) -> Figure:
     for on_top, axes in enumerate(panels, 1):
         lifts = frame[frame["on_top"] == on_top]
         for number, (family, group) in enumerate(lifts.groupby("family", sort=False)):
-            ruled = group["answer"].isin(ANSWERS[1:3])
+            ruled = group["answer"].isin(ANSWERS[1:4])
             for some, face in ((group[ruled], f"C{number}"), (group[~ruled], "none")):
                 dots = {"s": 14, "edgecolor": f"C{number}", "facecolor": face, "linewidth": 0.7}
                 label = family if face == "none" else None
@@ -140,8 +140,9 @@ def _answer(situation: Situation, distance: float) -> str:
     if situation.on_top >= HELD_DOWN:
         return ANSWERS[0]
     if held_by_rule(np.frombuffer(situation.key, np.int32)):
-        return ANSWERS[1 if offsets(situation)[0] <= MIDDLE else 2]
-    return ANSWERS[4] if distance else ANSWERS[3]
+        common, farthest = offsets(situation)
+        return ANSWERS[2 if farthest > 1 else 1 if common <= MIDDLE else 3]
+    return ANSWERS[5] if distance else ANSWERS[4]
 
 
 def _blocked(family: str, seed: int) -> Iterator[Situation]:
@@ -170,13 +171,13 @@ def _stacks(kind: str, seed: int) -> Iterator[Situation]:
     """Boxes of any proportions on the floor, each with one or two boxes of any proportions on it.
 
     Of two, one stands on the other or beside it. Those of the second kind stand between two more
-    boxes on the floor.
+    boxes on the floor. In those of the third kind two stand side by side, each on a post, too.
     """
     rng = np.random.default_rng([seed, len(FAMILIES) + STACKS.index(kind)])
     while True:
-        boxes = np.zeros((rng.integers(2, 4), 6))
+        boxes = np.zeros((3 if kind == STACKS[2] else rng.integers(2, 4), 6))
         boxes[:, 3:] = _sizes(rng, len(boxes))
-        tower = rng.random() < 0.5
+        tower = kind != STACKS[2] and rng.random() < 0.5
         for row in range(1, len(boxes)):
             base = boxes[row - 1 if tower else 0]
             reach = (base[3:5] + boxes[row, 3:5]) / 2 - 0.002  # m, of a shared stretch at least
@@ -185,6 +186,8 @@ def _stacks(kind: str, seed: int) -> Iterator[Situation]:
         dynamic = len(boxes)
         if kind == STACKS[1]:
             boxes = np.vstack([boxes, _neighbours(rng, boxes[0, 3:])])
+        elif kind == STACKS[2]:
+            boxes = np.vstack([boxes, _posts(rng, boxes)])
 
         floor = round(-boxes[0, 5] / 2 * 1e6)
         made = Situation(np.rint(boxes * 1e6).astype(np.int32), dynamic, floor, ())
@@ -208,6 +211,21 @@ def _neighbours(rng: np.random.Generator, size: np.ndarray) -> np.ndarray:
     boxes[:, 1] = (size[1] + boxes[:, 4]) / 2 * (-1, 1)
     boxes[:, 2] = (boxes[:, 5] - size[2]) / 2
     return boxes
+
+
+def _posts(rng: np.random.Generator, boxes: np.ndarray) -> np.ndarray:
+    """For each of two boxes on another one a post that is as high as that one, (2, 6) in m.
+
+    Half of these pairs stand under the far halves of the two; the others anywhere under them.
+    """
+    posts, upper = np.zeros((2, 6)), boxes[1:]
+    posts[:, 3:] = _sizes(rng, 2)
+    posts[:, 5] = boxes[0, 5]
+    offsets = rng.uniform(-1, 1, (2, 2)) * ((upper[:, 3:5] + posts[:, 3:5]) / 2 - 0.002)
+    if rng.random() < 0.5:
+        offsets = np.copysign(offsets, upper[:, :2])
+    posts[:, :2] = upper[:, :2] + offsets
+    return posts
 
 
 def _sizes(rng: np.random.Generator, count: int) -> np.ndarray:

@@ -55,8 +55,8 @@ def pile(*centres: tuple[float, float], floor: int | None = None, sides=()) -> S
         ([(0.49, -0.49)], True),
         ([(0.51, 0)], False),
         ([(0, -0.51)], False),
-        ([(1.49, 0), (-0.6, 0.7)], True),
-        ([(1.51, 0), (-0.9, 0)], False),
+        ([(0.99, 0), (-0.6, 0.7)], True),
+        ([(1.01, 0), (-0.6, 0)], False),
         ([(0.5, 1.1), (-0.5, -0.05)], False),
     ],
     ids=str,
@@ -93,8 +93,9 @@ LEFT, RIGHT = (0, -2, 0), (0, 2, 0)
         (between(LEFT, RIGHT, centres=[(0.5, 1.0)]), True),
         (between(LEFT, RIGHT, centres=[(0.51, 0.9)]), False),
         (between(LEFT, RIGHT, centres=[(0, 1.01)]), False),
-        (between(LEFT, RIGHT, centres=[(0, 0.45), (0, 1.49)]), True),
-        (between(LEFT, RIGHT, centres=[(0, 0.45), (0, 1.51)]), False),
+        (between(LEFT, RIGHT, centres=[(0, 0.45), (0, 0.99)]), True),
+        (between(LEFT, centres=[(0, 0.45), (0, 0.99)], sides=(SIDE // 2,)), True),
+        (between(LEFT, centres=[(0, 0.45), (0, 1.01)], sides=(SIDE // 2,)), False),
         (between(LEFT, RIGHT, centres=[(0.6, 0.9), (0.6, 0.9)]), False),
         (between(LEFT), False),
         (between(), False),
@@ -112,6 +113,39 @@ LEFT, RIGHT = (0, -2, 0), (0, 2, 0)
 )
 def test_between_others_a_box_is_held_wherever_the_load_is_above_it(situation, held):
     assert held_by_rule(np.frombuffer(situation.key, np.int32)) == held
+
+
+BOTH = [(1.2, 0), (-1.2, 0)]
+
+
+@pytest.mark.parametrize(
+    ("situation", "held"),
+    [
+        (between((2, 0, 0), (-2, 0, 0), centres=BOTH), True),
+        (between((2, 0, 0), centres=BOTH), False),
+        (between((2, 0, 0), (-2, 0, 0), centres=BOTH[:1]), False),
+        (between((2, 0, 0), (-2, 0, 0), centres=[*BOTH, (0, 0)]), False),
+        (between((1.2, 0, 0), (-1.2, 0, 0), centres=BOTH), True),
+        (between((1.2, 0, 0), (-1.19, 0, 0), centres=BOTH), False),
+        (between((2, 0, 0), (-2, 1.99, 0), centres=BOTH), True),
+        (between((2, 0, 0), (-2, 2.01, 0), centres=BOTH), False),
+        (between((2, 0, 0), (-3.21, 0, 0), centres=BOTH), False),
+        (between((2, 0, 0), (-2, 0, -0.01), centres=BOTH), False),
+        (between((2, 0, 0), (-2, 0, 0), centres=[(1.2, 0), (0, 0)]), True),
+        (between((2, 0, 0), (-2, 0, 0), centres=[(1.2, 0), (0.01, 0)]), False),
+        (between((2, 0, 0), (-2, 0, 0), centres=[(1.2, 0), (1.2, 0)]), False),
+        (between((1.02, 2, 0), (0, -2, 0), centres=[(0, 1.2), (0, -1.2)]), True),
+        (between((1.02, 1.19, 0), (0, -2, 0), centres=[(0, 1.2), (0, -1.2)]), False),
+    ],
+)
+def test_two_side_by_side_hold_a_box_down_if_their_far_ends_lie_on_others(situation, held):
+    assert held_by_rule(np.frombuffer(situation.key, np.int32)) == held
+
+
+def test_of_two_side_by_side_none_stands_on_the_other():
+    tower = between((2, 0, 0), (-2, 0, 0), centres=BOTH)
+    tower.boxes[2, 2] += SIDE
+    assert not held_by_rule(np.frombuffer(tower.key, np.int32))
 
 
 @pytest.mark.parametrize(("height", "held"), [(0.25, True), (0.24, False)])

@@ -3,9 +3,9 @@
 A lift depends on its situation alone, so a table of lifts says how far the box of a situation
 moved. The table is only as good as the physics that filled it: a file of another physics is
 refused. Where physics leaves no doubt, rules answer instead: a box with nothing on top is free, one
-with three or more others on top is held down, and so is one under one or two others that lie on its
-middle, or near it if it stands between others. What is simulated is given up where it has become
-hopeless.
+with three or more others on top is held down, and so is one under one or two others that press on
+its middle, or near it if it stands between others. What is simulated is given up where it has
+become hopeless.
 """
 
 import json
@@ -28,16 +28,18 @@ PhysicsName = Literal["local", "places", "table"]
 
 UNKNOWN = -1  # in place of a distance that is not in the table
 HELD_DOWN = 3  # so many boxes on top hold a box down
-# One or two hold it down, too, if they lie on its middle. Along x and along y, let 0 be its centre
-# and 1 its edge: so far out may the common centre of those on top be, and the centre of each one.
+# One or two hold it down, too, if they press on its middle. Along x and along y, let 0 be its
+# centre and 1 its edge: so far out may they press on average. A box on top presses at its own
+# centre, which must lie above the chosen box. Only of two that lie on it side by side may a centre
+# lie beyond the edge: this one presses there, if its far end lies on another box.
 MIDDLE = 0.5
-FARTHEST = 1.5
-# A box between two others cannot tip sideways. So along y the common centre of those on top may be
-# anywhere from edge to edge. The box counts as between others if they cover at least this share of
+# A box between two others cannot tip sideways. So along y those on top may press on it anywhere, on
+# average, from edge to edge. The box counts as between others if they cover at least this share of
 # its left and of its right face, and if it is at most so many times as wide as high: a flatter one
 # tips within the gaps.
 COVERED = 0.5
 FLAT = 4.0
+NEAR = CONTACT_TOLERANCE / RESOLUTION  # micrometres between faces that touch, at most
 HARDLY = 0.25  # of the threshold: a pull that would not even lift so far is given up
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
 _ARRAYS = {"digests", "micrometres", "settings"}  # of a file
@@ -239,38 +241,62 @@ def held_by_rule(key):
     """Whether what lies on the chosen box, one box or two, holds it down for certain.
 
     The pull raises 1.04 boxes besides the chosen one. So one on its middle rises by 9 mm, and off
-    it, it tips aside, unless it stands between others; two on it hold it down even if their other
-    ends lie on neighbours. See ``MIDDLE`` and ``COVERED``.
+    it, it tips aside, unless it stands between others; two hold it down even if their other ends
+    lie on neighbours, because half of their weight is that of one. See ``MIDDLE`` and ``COVERED``.
 
     Args:
         key: the words of a situation's key, see ``Situation.key``.
     """
     _, first = parts_of_key(key)
-    if key[0] - 1 >= HELD_DOWN or not _lies_within(key, first, MIDDLE, 1.0):
+    if key[0] - 1 >= HELD_DOWN or not _presses_within(key, first, MIDDLE, 1.0):
         return False
-    return _lies_within(key, first, MIDDLE, MIDDLE) or _between_others(key, first)
+    return _presses_within(key, first, MIDDLE, MIDDLE) or _between_others(key, first)
 
 
 @compiled(plain=True)
-def _lies_within(key, first, along_x, along_y):
-    """Whether the common centre of the boxes on top is so near, and each one not too far.
+def _presses_within(key, first, along_x, along_y):
+    """Whether the boxes on top press on the chosen one so near its centre, on average.
 
     Args:
         key: the words of a situation's key.
         first: the index in it where the boxes begin, with the chosen one.
-        along_x, along_y: how far out the common centre may be, as for ``MIDDLE``.
+        along_x, along_y: how far out that may be, as for ``MIDDLE``.
     """
     on_top = key[0] - 1
     for axis, middle in enumerate((along_x, along_y)):
-        edge, total = key[first + 3 + axis], 0
+        edge, total = key[first + 3 + axis], 0.0
         for box in range(1, on_top + 1):
             centre = key[first + 6 * box + axis]
-            if 2 * abs(centre) > FARTHEST * edge:
+            if 2 * abs(centre) <= edge:
+                total += centre
+            elif _bridges(key, first, box, axis):
+                total += np.sign(centre) * edge / 2
+            else:
                 return False
-            total += centre
         if 2 * abs(total) > middle * on_top * edge:
             return False
     return True
+
+
+@compiled(plain=True)
+def _bridges(key, first, box, axis):
+    """Whether two lie side by side on the chosen box, and this one's far end on another box."""
+    if key[0] != 3:
+        return False
+    for upper in (first + 6, first + 12):
+        if abs(key[upper + 2] - (key[upper + 5] + key[first + 5]) / 2) > NEAR:
+            return False
+    upper = first + 6 * box
+    side = 1 if key[upper + axis] > 0 else -1
+    for lower in range(first + 18, len(key), 6):
+        x = _shared(key[lower] - key[upper], key[lower + 3], key[upper + 3])
+        y = _shared(key[lower + 1] - key[upper + 1], key[lower + 4], key[upper + 4])
+        gap = key[upper + 2] - key[lower + 2] - (key[upper + 5] + key[lower + 5]) / 2
+        beyond = side * (key[lower + axis] - key[upper + axis])
+        beyond += (key[lower + 3 + axis] - key[upper + 3 + axis]) / 2
+        if x > 0 and y > 0 and abs(gap) <= NEAR and beyond >= -NEAR:
+            return True
+    return False
 
 
 @compiled(plain=True)
@@ -279,7 +305,7 @@ def _between_others(key, first):
     depth, width, height = key[first + 3], key[first + 4], key[first + 5]
     if width > FLAT * height:
         return False
-    near = width / 2 + CONTACT_TOLERANCE / RESOLUTION  # its sides are so far from its centre
+    near = width / 2 + NEAR  # its sides are so far from its centre
     left = right = 0.0  # shares of its faces
     sides, _ = parts_of_key(key)
     for side in key[sides:first]:
