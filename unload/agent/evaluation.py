@@ -124,16 +124,19 @@ class _Chooser:
         # Not the numbers that the load of the same seed is made of.
         self._rngs = [np.random.default_rng((seed, 1)) for seed in seeds]
         self._shared = np.random.default_rng(0)
-        self._untouched = self._shared.bit_generator.state
 
     def __call__(self, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
-        if self._shared.bit_generator.state == self._untouched:
+        if not self._draws():
             actions = self._ask(observations, allowed, self._shared)
-            if self._shared.bit_generator.state == self._untouched:
+            if not self._draws():
                 return actions
         parts = zip(np.split(observations, len(allowed)), np.split(allowed, len(allowed)))
         asked = [self._ask(*part, rng) for part, rng in zip(parts, self._rngs)]
         return np.concatenate(asked)
+
+    def _draws(self) -> bool:
+        """Whether the policy has ever drawn from the generator that all episodes share."""
+        return self._shared.bit_generator.state != np.random.default_rng(0).bit_generator.state
 
     def _ask(self, observations, allowed, rng) -> np.ndarray:
         """What the policy returns is checked before anything is picked: it may be anybody's."""

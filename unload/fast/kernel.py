@@ -368,8 +368,9 @@ def _forward(inputs, item, items, block):
     for f in range(_BLOCK):
         part = _feature(_OWN, 0, f, block) + _feature(_LOWEST, 1, f, block)
         block[_PART + f] = part + (_feature(_HIGHEST, 2, f, block) + _feature(_MEAN, 3, f, block))
+    # Their sum, in an order that needs few steps one after the other: halves onto halves.
     half = _BLOCK // 2
-    while half:  # in an order that needs few steps one after the other
+    while half:
         for f in range(half):
             block[_PART + f] += block[_PART + half + f]
         half //= 2

@@ -97,6 +97,7 @@ def _check_names(path: str | None, output: str | None, picture: str | None) -> N
             if not os.access(names[-1].resolve().parent, os.W_OK):
                 wanted = "expected it in a folder that is there and may be written to"
                 raise ValueError(f"{option} is {name!r}; {wanted}")
+    # A file that is there may have several names; its inode and device are the same under all.
     identities = {n.stat()[1:3] if n.exists() else n.resolve() for n in names}
     if len(identities) < len(names):
         raise ValueError(f"{' and '.join(map(str, names))} are one file; expected different ones")

@@ -110,18 +110,19 @@ def _reachable_first(load: Load, stops: np.ndarray | None) -> np.ndarray:
     can be reached does not change, and a pick frees only those that waited for this very box.
     """
     keys = [*-_front_and_top(load)[::-1]]
-    by_preference = np.lexsort(keys if stops is None else [*keys, _due(load, stops)])
-    preference = np.argsort(by_preference).tolist()
+    # The order in which they would come if all could be reached, and the turn of each box in it.
+    preferred = np.lexsort(keys if stops is None else [*keys, _due(load, stops)])
+    turns = np.argsort(preferred).tolist()
 
-    # For how many others each box waits, and which boxes wait for it: of those on it, and in front.
-    waits, waiting = [], []
+    # How many boxes block each one, and which ones it blocks: first from above, then from in front.
+    blocking, blocked = [], []
     for boxes, others in (load.covers, load.fronts):
-        waits.append(np.bincount(boxes, minlength=len(load)))
+        blocking.append(np.bincount(boxes, minlength=len(load)))
         ends = np.cumsum(np.bincount(others, minlength=len(load)))
-        waiting.append(np.split(boxes[np.argsort(others)], ends[:-1]))
+        blocked.append(np.split(boxes[np.argsort(others)], ends[:-1]))
 
     def key(box: int) -> tuple[bool, bool, int]:
-        return bool(waits[0][box]), bool(waits[1][box]), preference[box]
+        return bool(blocking[0][box]), bool(blocking[1][box]), turns[box]
 
     # Blocked boxes are in the heap, too, behind all free ones: where boxes wait for each other in a
     # circle none is free, and the rule picks a blocked one. A box that has become free is pushed
@@ -129,14 +130,14 @@ def _reachable_first(load: Load, stops: np.ndarray | None) -> np.ndarray:
     heap, present, order = [*map(key, range(len(load)))], np.ones(len(load), bool), []
     heapify(heap)
     while heap:
-        item = by_preference[heappop(heap)[-1]]
+        item = preferred[heappop(heap)[-1]]
         if present[item]:
             present[item] = False
             order.append(item)
-            for counts, lists in zip(waits, waiting):
-                freed = lists[item]
-                counts[freed] -= 1
-                for box in freed[counts[freed] == 0]:
+            for counts, lists in zip(blocking, blocked):
+                under_or_behind = lists[item]
+                counts[under_or_behind] -= 1
+                for box in under_or_behind[counts[under_or_behind] == 0]:
                     heappush(heap, key(box))
     return np.array(order)
 

@@ -89,46 +89,8 @@ def read_load(
     container = checks.finite_array("container", container, (3,))
     checks.entries("columns", {} if columns is None else columns, ())
     header = checks.integer("header", header, 1)
-    table = read_table(path, header)
-    names = _columns_by_meaning([*table], columns or {})
-    ids = table[names["id"]] if "id" in names else np.arange(1, len(table) + 1)
-    ids = np.array([*map(str, ids)])
-
-    def refuse(rows: np.ndarray, problem: str, argument: str | None = None) -> NoReturn:
-        shown = ", ".join(f"row {row + 1} (id {str(ids[row])!r})" for row in rows[:5])
-        more = f" and {len(rows) - 5} more" if len(rows) > 5 else ""
-        raise ListError(f"{shown}{more}: {problem}", argument)
-
-    if "id" in names and (missing := np.flatnonzero(table[names["id"]].isna() | (ids == ""))).size:
-        refuse(missing, f"{names['id']} is empty; expected one for each box")
-
-    def numbers(meaning: str) -> np.ndarray:
-        name = names[meaning]
-        cells = pd.to_numeric(table[name], errors="coerce").to_numpy(float)
-        if (wrong := np.flatnonzero(~(np.abs(cells) <= LARGEST_NUMBER))).size:
-            wanted = f"expected a number, at most {LARGEST_NUMBER:,.0f}"
-            refuse(wrong, f"{name} is {str(table[name][wrong[0]])!r}; {wanted}")
-        return cells
-
-    # A box turned otherwise than by quarter turns is none along the axes.
-    for turn in (name for name in ROTATIONS if name in names):
-        if (turned := np.flatnonzero(np.abs((numbers(turn) + 45) % 90 - 45) > 1e-3)).size:
-            refuse(turned, f"a {names[turn]} that is no quarter turn; expected one")
-
-    place = CENTRE if {*CENTRE} <= {*names} else CORNER
-    read = (*place, *SIZES, "id")
-    # In mm, 1.200 has thousands or decimals; a number such as 0.000 or 1200.000 says which.
-    in_mm = table[[names[n] for n in read[:6] if (_split_unit(names[n])[1] or units) == "mm"]]
-    texts = [cell for cell in in_mm.to_numpy().ravel() if isinstance(cell, str)]
-    unclear = [cell for cell in texts if re.fullmatch(r"-?[1-9]\d{0,2}\.\d{3}", cell)]
-    if unclear and not any(re.match(r"-?(0|\d{4,})\.", cell) for cell in texts):
-        found = f"{unclear[0]!r} in mm may have thousands or decimals"
-        refuse(np.flatnonzero(in_mm.isin(unclear).any(axis=1)), f"{found}; expected 1200 or 1.2")
-
-    # Lengths in m, and x from the rear.
-    lengths = [numbers(name) / UNITS[_split_unit(names[name])[1] or units] for name in read[:6]]
-    centres, sizes = np.hsplit(np.stack(lengths, axis=1), 2)
-    centres = centres if place is CENTRE else centres + sizes / 2
+    rows = _Rows(read_table(path, header), columns or {}, units)
+    centres, sizes = rows.boxes()
     if x_from == "door":
         centres[:, 0] = container[0] - centres[:, 0]
 
@@ -138,27 +100,26 @@ def read_load(
         load = Load(
             centres + moves,
             sizes - smaller,
-            ids=ids,
+            ids=rows.ids,
             container=container,
-            extras={str(n): _extra(table[n]) for what, n in names.items() if what not in read},
+            extras=rows.extras(),
             contact_tolerance=max(tolerance, CONTACT_TOLERANCE),
         )
         check_supported(load)
     except BoxError as error:
         outside = np.abs(centres - container / 2) + sizes / 2 - container / 2
-        argument = "container" if outside.max() > LARGEST_TOLERANCE else "tolerance"
+        problem, argument = error.problem, "tolerance"
         if outside.max() > 2 * container.max():  # so far outside that the unit must be wrong
             argument = "units"
-        problem = error.problem
-        if place is CENTRE and argument != "units" and centres[:, 2].min() <= tolerance:
-            corners = ", ".join(f"{names[c]}={corner}" for c, corner in zip(CENTRE, CORNER))
-            problem, argument = (
-                f"{problem}; if these are no centres but corners: {corners}",
-                "columns",
-            )
-        refuse(np.array(error.boxes), problem, argument if error.misplaced else None)
+        elif rows.place is CENTRE and centres[:, 2].min() <= tolerance:
+            corners = ", ".join(f"{rows.names[c]}={corner}" for c, corner in zip(CENTRE, CORNER))
+            problem += f"; if these are no centres but corners: {corners}"
+            argument = "columns"
+        elif outside.max() > LARGEST_TOLERANCE:
+            argument = "container"
+        rows.refuse(np.array(error.boxes), problem, argument if error.misplaced else None)
     if (tipping := uncarried(load)).size:
-        refuse(tipping, "tips, because nothing carries its centre of mass", "tolerance")
+        rows.refuse(tipping, "tips, because nothing carries its centre of mass", "tolerance")
     for edits, what in ((moves, "moved by"), (smaller, "taken for smaller, by")):
         if edits.any():
             count, most = edits.any(axis=1).sum(), 1000 * np.linalg.norm(edits, axis=1).max()
@@ -168,6 +129,73 @@ def read_load(
         hidden = 2000 * (tolerance + np.abs(moves).max() + smaller.max() / 2)
         LOGGER.warning("An order may overlook overlaps of up to %.0f mm", hidden)
     return load
+
+
+class _Rows:
+    """The rows of a list by what its columns mean; a refusal names some of them and their ids.
+
+    Attributes:
+        names: of the columns, by their meaning.
+        ids: (n,) texts.
+        place: what says where a box is, ``CENTRE`` or ``CORNER``.
+    """
+
+    def __init__(self, table: pd.DataFrame, columns: Mapping[str, str], units: str) -> None:
+        self._table, self._units = table, units
+        self.names = _columns_by_meaning([*table], columns)
+        self.place = CENTRE if {*CENTRE} <= {*self.names} else CORNER
+        named = table[self.names["id"]] if "id" in self.names else 1 + np.arange(len(table))
+        self.ids = np.array([*map(str, named)])
+        missing = np.flatnonzero(pd.isna(named) | (self.ids == ""))
+        if missing.size:
+            self.refuse(missing, f"{self.names['id']} is empty; expected one for each box")
+
+    def refuse(self, rows: np.ndarray, problem: str, argument: str | None = None) -> NoReturn:
+        """Raise ListError for these rows, (k,) int64, and the argument that may help."""
+        shown = ", ".join(f"row {row + 1} (id {str(self.ids[row])!r})" for row in rows[:5])
+        more = f" and {len(rows) - 5} more" if len(rows) > 5 else ""
+        raise ListError(f"{shown}{more}: {problem}", argument)
+
+    def boxes(self) -> tuple[np.ndarray, np.ndarray]:
+        """The centres of all boxes, x as the list counts it, and their edges, (n, 3) in m each."""
+        # A box turned otherwise than by quarter turns is none along the axes.
+        for turn in (name for name in ROTATIONS if name in self.names):
+            turned = np.flatnonzero(np.abs((self._numbers(turn) + 45) % 90 - 45) > 1e-3)
+            if turned.size:
+                self.refuse(turned, f"a {self.names[turn]} that is no quarter turn; expected one")
+        self._check_decimals()
+        lengths = [self._numbers(name) / UNITS[self._unit(name)] for name in (*self.place, *SIZES)]
+        places, sizes = np.hsplit(np.stack(lengths, axis=1), 2)
+        return places if self.place is CENTRE else places + sizes / 2, sizes
+
+    def extras(self) -> dict[str, np.ndarray]:
+        """The columns that are not read, by their names."""
+        read = (*self.place, *SIZES, "id")
+        others = [name for meaning, name in self.names.items() if meaning not in read]
+        return {str(name): _extra(self._table[name]) for name in others}
+
+    def _unit(self, meaning: str) -> str:
+        return _split_unit(self.names[meaning])[1] or self._units
+
+    def _numbers(self, meaning: str) -> np.ndarray:
+        """The cells of a column, (n,) float64."""
+        name = self.names[meaning]
+        cells = pd.to_numeric(self._table[name], errors="coerce").to_numpy(float)
+        if (wrong := np.flatnonzero(~(np.abs(cells) <= LARGEST_NUMBER))).size:
+            wanted = f"expected a number, at most {LARGEST_NUMBER:,.0f}"
+            self.refuse(wrong, f"{name} is {str(self._table[name][wrong[0]])!r}; {wanted}")
+        return cells
+
+    def _check_decimals(self) -> None:
+        """Refuse lengths in mm such as 1.200, unless another one shows what the mark is of."""
+        lengths = (*self.place, *SIZES)
+        in_mm = self._table[[self.names[name] for name in lengths if self._unit(name) == "mm"]]
+        texts = [cell for cell in in_mm.to_numpy().ravel() if isinstance(cell, str)]
+        unclear = [cell for cell in texts if re.fullmatch(r"-?[1-9]\d{0,2}\.\d{3}", cell)]
+        if unclear and not any(re.match(r"-?(0|\d{4,})\.", cell) for cell in texts):
+            found = f"{unclear[0]!r} in mm may have thousands or decimals"
+            rows = np.flatnonzero(in_mm.isin(unclear).any(axis=1))
+            self.refuse(rows, f"{found}; expected 1200 or 1.2")
 
 
 def _columns_by_meaning(names: list, columns: Mapping[str, str]) -> dict[str, str]:
