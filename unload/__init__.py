@@ -34,7 +34,7 @@ if TYPE_CHECKING:  # what ``_MODULES`` says, for type checkers
     from unload.orders.order import picking_order as picking_order
     from unload.orders.packing_list import read_load as read_load
 
-# Where each public name is defined; a module has itself.
+# Where each public name is defined. ``policies`` is a module, which has no such name in it.
 _MODULES = {
     "DQN": "agent.dqn",
     "ContainerEnv": "env.container",

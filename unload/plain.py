@@ -1,8 +1,8 @@
 """The system on one page: the task of the paper, and masked DQN, which learns it.
 
 Read this first. It is written to be understood, and looks at all boxes at each pick. ``env``,
-``fast`` and ``agent`` do the same faster, and the tests hold them equal to this page by bits, the
-training with ``fused_update=False``, because the fused update rounds otherwise.
+``fast`` and ``agent`` do the same faster. The tests check that they give the same bits as this
+page; training does with ``fused_update=False``, because the fused update rounds differently.
 ``python -m unload.plain`` trains on positions, in half a minute.
 """
 
@@ -184,10 +184,10 @@ def choose(network, observations, allowed, epsilon, rng):
 def update(network, target, optimizer, picks, gamma):
     """Bring the values of remembered picks nearer to their targets; return the loss."""
     columns = (torch.from_numpy(np.array(column)) for column in zip(*picks))
-    before, chosen, reward, after, free, ended = columns  # (batch, ...) each
+    before, chosen, reward, after, allowed_after, ended = columns  # (batch, ...) each
     with torch.no_grad():
-        best = target(after).masked_fill(~free, -torch.inf).amax(dim=1)
-    goal = reward + gamma * best.masked_fill(ended, 0)  # (batch,); nothing follows an empty one
+        best = target(after).masked_fill(~allowed_after, -torch.inf).amax(dim=1)
+    goal = reward + gamma * best.masked_fill(ended, 0)  # (batch,); no pick follows the last one
     values = network(before).gather(1, chosen[:, None])[:, 0]  # (batch, 128) -> (batch,)
     loss = smooth_l1_loss(values, goal)  # ()
     optimizer.zero_grad()
@@ -205,12 +205,14 @@ def pick(choose, envs, network, seen, epsilon, mask, rng):
 
     # Where an episode has ended, Gymnasium has begun the next one already. What was seen last in
     # the old one stands in ``final_obs`` and ``final_info``, and belongs to the pick.
-    after, free = following.copy(), infos["action_mask"].astype(bool)  # (E, 128, 3), (E, 128)
+    after = following.copy()  # (E, 128, 3)
+    allowed_after = infos["action_mask"].astype(bool)  # (E, 128)
     for env in np.flatnonzero(infos.get("_final_obs", [])):
         after[env] = infos["final_obs"][env]
-        free[env] = infos["final_info"]["action_mask"][env]
-    picks = zip(observations, actions, rewards.astype(np.float32), after, free, ended)
-    return list(picks), (following, infos)
+        allowed_after[env] = infos["final_info"]["action_mask"][env]
+    rewards = rewards.astype(np.float32)
+    picks = list(zip(observations, actions, rewards, after, allowed_after, ended))
+    return picks, (following, infos)
 
 
 def masked_dqn(envs, network, steps, seeds, gamma=0.0, mask=True, batch_size=64, size=2**20):

@@ -1,4 +1,4 @@
-"""The paper's numbers, each once and with its source; names of the tasks, and unload's version.
+"""All constants of the paper, each once and with its section; names of the tasks, and the version.
 
 Lengths in metres, forces in newtons, times in seconds. The container's axes are
 x (depth, 0 at the rear wall and 7 at the entrance), y (width) and z (height).
@@ -11,7 +11,8 @@ VERSION = "0.3.0"  # of unload, as in pyproject.toml
 # Under which Gymnasium knows the container (Sec. III) and the tuning environment (Sec. IV-A).
 CONTAINER_ENV, HIGHEST_ITEM_ENV = "unload/Container-v0", "unload/HighestItem-v0"
 
-# Sec. III-A, scaling of the observation: inner size of the container.
+# Sec. III-A: inner size of the container. Observed coordinates are scaled to [-1, 1] from one side
+# of it to the other.
 CONTAINER = np.array([7.0, 2.5, 2.5])
 # Sec. III-A: number of items in a full container.
 MIN_ITEMS, MAX_ITEMS = 800, 1000
@@ -21,7 +22,7 @@ GRAVITY = 9.81
 
 # Sec. III-B: only the items nearest to the viewpoint are observed.
 N_VISIBLE = 128
-PADDING = -1.0  # in the rows without an item: a corner of the container, where no centre can lie
+PADDING = -1.0  # three times in rows without an item: a corner, where no centre can lie
 VIEWPOINT = np.array([7.0, 1.25, 2.5])
 # Sec. III-B, diagonal of W: y does not count, z counts more than x.
 DISTANCE_WEIGHTS = np.array([1.0, 0.0, 4.0])

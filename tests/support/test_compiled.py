@@ -55,7 +55,7 @@ def tripled(number):
     return number * np.uint64(3)
 
 
-def test_a_plain_function_is_compiled_as_soon_as_another_one_is(monkeypatch):
+def test_a_lazy_function_is_compiled_as_soon_as_another_one_is(monkeypatch):
     """Until then integers wrap as they do in compiled code; numba's settings stay the user's."""
     function, number, before = Compiled(tripled, True, {}), np.uint64(2**63), numba.config.CACHE_DIR
     monkeypatch.setattr(Compiled, "any_compiled", False)

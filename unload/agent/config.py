@@ -85,10 +85,10 @@ class TrainConfig:
         equalize: whether observations are equalized (Sec. III-F).
         ties: * ``"noise"`` or ``"average"``, see ``unload.equalize``.
         position_noise: * m, see ``ContainerEnv``; 0 ranks equal coordinates in the items' order.
-        mask: * whether training may not choose either what has failed since the last success. If
-            not, only rows without an item are excluded. The maximum in a target, which needs
-            ``gamma`` > 0, leaves failed items out in both cases, as ``unload.evaluate`` does by
-            default.
+        mask: * if True, training may not choose items that have failed since the last success
+            either; if False, only rows without an item are excluded. The maximum in a target, which
+            needs ``gamma`` > 0, leaves failed items out in both cases, as ``unload.evaluate`` does
+            by default.
         gradient_steps: * updates per step of all environments.
         target_update_interval: * picks, as in Stable-Baselines3; without effect if gamma is 0.
         log_interval: * steps of all environments per point of the curve; 0 stands for a hundredth
@@ -126,7 +126,7 @@ class TrainConfig:
         hundredth = max(1, self.picks // self.num_envs // 100)
         object.__setattr__(self, "log_interval", self.log_interval or min(500, hundredth))
 
-        # What the fields must be of each other.
+        # What the fields must be of each other. An update needs a batch of earlier steps' picks.
         fewest = self.num_envs + min(self.batch_size, self.replay_size)
         for name, wrong, wanted in (
             ("picks", self.picks % self.num_envs, f"a multiple of num_envs={self.num_envs}"),

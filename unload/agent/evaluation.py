@@ -117,7 +117,11 @@ def evaluate(
 
 
 class _Chooser:
-    """Asks a policy about all episodes at once, or one by one as soon as it draws."""
+    """Asks a policy about all episodes in one call, unless it draws random numbers.
+
+    If such a call draws from the generator that it is handed, its answer is thrown away, and from
+    then on the policy is asked about one episode at a time, each with a generator of its own.
+    """
 
     def __init__(self, policy: Policy, seeds: list[int]) -> None:
         self._policy = policy

@@ -25,7 +25,7 @@ def greedy_actions(
     masks: np.ndarray,
     present: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Do as ``best_actions`` the fastest way; masks may hold 0 and 1, observations any float."""
+    """``best_actions`` by the fastest code; masks may hold 0 and 1, observations any float."""
     observations, allowed = check_batch(observations, masks)
     observations = observations.astype(np.float32, copy=False)
     if fused.applies(network):  # it reads each item alone, so that padded rows do not matter
@@ -83,7 +83,7 @@ class Greedy:
 def save_policy(policy: Greedy, path: str | Path) -> None:
     """Write a policy's weights and how to use them, as safetensors, in one atomic step.
 
-    So is its card, to which the version of unload is added. The file holds a digest of all
+    The file also holds the policy's card, with the version of unload added, and a digest of all
     this, so that a damaged one is not read.
 
     Raises:

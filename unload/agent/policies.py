@@ -41,9 +41,9 @@ def any_allowed(allowed: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 def choosable(masks: np.ndarray, present: np.ndarray) -> np.ndarray:
     """The masks, and where one excludes all, the items that are present.
 
-    Both are (batch, 128), bool or 0 and 1, and so is what is returned. A neat load always has a
-    box that can be lifted; in others a container may get stuck, and its episode still has picks to
-    make.
+    Both are (batch, 128), bool or 0 and 1, and so is what is returned. A load of upright
+    boxes in walls, as the paper's, always has a box that can be lifted; with others a container may
+    get stuck, and its episode still has picks to make.
     """
     return masks | present & ~masks.any(axis=1, keepdims=True)
 
@@ -55,6 +55,6 @@ def nearest(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generato
 
 
 def highest(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The allowed item whose centre is highest; in a neat load nothing lies on it."""
+    """The allowed item whose centre is highest; in the paper's loads nothing lies on it."""
     observations, allowed = check_batch(observations, masks)
     return np.where(allowed, observations[..., 2], -np.inf).argmax(axis=1)

@@ -92,7 +92,8 @@ class Rollout:
         following, rewards, terminations, truncations, infos = self.envs.step(actions)
         picks = {"observations": seen, "actions": actions, "rewards": rewards}
 
-        # Where an episode has ended, what its last pick has led to stands apart from the reset's.
+        # Where an episode has ended, what its last pick led to stands in final_info and final_obs:
+        # all else is of the next episode already.
         ended, last = terminations | truncations, infos.get("final_info", {})
         unknown = np.full(len(actions), np.nan)
         distances = np.where(ended, last.get("distance", unknown), infos.get("distance", unknown))

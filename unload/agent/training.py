@@ -176,14 +176,13 @@ class Training:
     def policy(self) -> Greedy:
         """Return a copy of what has been learned so far, with a card."""
         config, settings, points = self.config, dict(self.settings), self.curve.points
-        card = {
-            "change": settings.pop("change"),
-            "loads": settings.pop("stack") or ("the paper's" if config.env in ENVS else config.env),
-            **{name: settings.pop(name) for name in ("engine",) if name in settings},
-            "configuration": settings,
-            "picks": self.rollout.picks,
-            "msr": {"at the end of its training": points[-1].success_rate} if points else {},
-        }
+        loads = settings.pop("stack") or ("the paper's" if config.env in ENVS else config.env)
+        card: dict[str, Any] = {"change": settings.pop("change"), "loads": loads}
+        if "engine" in settings:
+            card["engine"] = settings.pop("engine")
+        card["configuration"] = settings
+        card["picks"] = self.rollout.picks
+        card["msr"] = {"at the end of its training": points[-1].success_rate} if points else {}
         return Greedy(deepcopy(self.agent.network), config.equalize, config.ties, card)
 
 
@@ -298,8 +297,8 @@ def _train_to_end(
 ) -> None:
     """Train to the end, or until the callback returns False, and finish the run.
 
-    If it is stopped between two steps, there is a checkpoint of the last one, unless a weight is no
-    longer finite; after an error inside of a step there is the one before, if any.
+    If it is stopped between two steps, a checkpoint of the last one is written, unless a weight is
+    no longer finite. If a step itself fails, the checkpoint that was written before stays.
     """
     rollout = run.rollout
     checkpoint_saved, curve_saved = time.monotonic(), 0.0

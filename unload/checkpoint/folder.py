@@ -69,7 +69,8 @@ class RunFolder:
 
     def save(self, run: Any) -> None:
         """Write the ``state_dict()`` of a run as its checkpoint."""
-        self._remove(PARTIAL)  # first: the disk has room for two checkpoints
+        # First, because the disk may have no room for it beside the old checkpoint and the new one.
+        self._remove(PARTIAL)
         marks = {"format": FORMAT, "package": package(), "settings": self._settings}
         files.write_nested(self._checkpoint_file, marks | {"run": run.state_dict()})
 

@@ -100,7 +100,7 @@ def still(
 def numbered(load: Load, items: np.ndarray) -> bytes:
     """Return a PNG picture of a load whose first fifty picks are coloured and numbered.
 
-    Those that no one sees have no number.
+    Hidden boxes have no number.
 
     Args:
         load: as it is before the first pick.

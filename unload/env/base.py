@@ -176,7 +176,7 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         Where it begins in this step, the observation and infos are the reset's.
         """
         self._check_started()
-        # Where an episode has ended in an earlier step, it waits for a reset. With SAME_STEP, none.
+        # Waiting for a reset: the episode ended in an earlier step. With SAME_STEP none ever waits.
         waiting = self._emptied() | (self._picks == self.max_picks)
         if waiting.any() and self.autoreset_mode is AutoresetMode.DISABLED:
             raise ResetNeeded("an episode is finished; call reset with a reset_mask first")
@@ -201,7 +201,8 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
             final = self._final_infos(ended, picked)
             self._begin(ended, self._rngs)
 
-        # The infos are a reset's where there was one, and the pick's elsewhere.
+        # Fresh are those that have been reset in this step: their infos are a reset's, and those of
+        # all others the pick's.
         fresh = ended if self.autoreset_mode is AutoresetMode.SAME_STEP else waiting
         infos = _flagged(self._infos(), np.ones(self.num_envs, bool))
         if not fresh.all():  # a reset has no infos about a pick
@@ -296,7 +297,7 @@ class PickingEnv(EpisodeEnv):
     """A single environment: a vector environment of one, without its first axis.
 
     Args:
-        envs: the vector environment, which leaves the next reset to its caller.
+        envs: a vector environment of one, with ``AutoresetMode.DISABLED``.
         render_mode: one of ``metadata["render_modes"]``, or None.
     """
 

@@ -65,14 +65,19 @@ def equalize(
 
 
 def _shared_ranks(ordered: np.ndarray) -> np.ndarray:
-    """The mean rank of each run of tied values, see ``task``, which are sorted on axis -2."""
+    """The mean rank of each run of tied values; ``ordered`` is sorted on axis -2.
+
+    A run goes on while neighbours differ by at most ``task.TIE_TOLERANCE``.
+    """
     items = ordered.shape[-2]
     index = np.broadcast_to(np.arange(items)[:, None], ordered.shape)
+    # Whether a run begins with an item, and whether one ends with it.
     opens = np.ones(ordered.shape, dtype=bool)
     with np.errstate(invalid="ignore"):  # inf - inf, between rows without an item
         opens[..., 1:, :] = np.diff(ordered, axis=-2) > task.TIE_TOLERANCE
     closes = np.ones(ordered.shape, dtype=bool)
     closes[..., :-1, :] = opens[..., 1:, :]
+    # Of each item, where its run begins (the last beginning so far), and where it ends.
     first = np.maximum.accumulate(np.where(opens, index, 0), axis=-2)
     reverse = np.where(closes, index, items - 1)[..., ::-1, :]
     last = np.minimum.accumulate(reverse, axis=-2)[..., ::-1, :]

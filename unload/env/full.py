@@ -18,7 +18,7 @@ class FullContainer(ContainerVectorEnv):
     """
 
     def __init__(self, physics: FullPhysics, settings: dict[str, Any]) -> None:
-        super().__init__(1, "local", **settings)
+        super().__init__(1, "local", **settings)  # "local" is replaced in the next line
         self.physics = physics
 
     @property
@@ -56,7 +56,8 @@ class FullContainer(ContainerVectorEnv):
         elif item >= 0:
             self._failed[item] = True
 
-        # Boxes that may have moved are all seen anew; what has failed stays so.
+        # Where boxes may have moved, all are seen anew. This clears the mask, so what has failed
+        # is masked again.
         if self._drifts:
             left = np.flatnonzero(self._present(0))
             self._show(0, left, self.physics.positions(), self._loads[0])

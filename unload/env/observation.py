@@ -71,7 +71,7 @@ def holds_item(observations: np.ndarray) -> np.ndarray:
 
     Args:
         observations: (..., items, 3) float, scaled positions. Equalized ones do not show it:
-            an item that is last on every axis has the ranks of padding.
+            an item that is first on every axis has -1 three times, as padding does.
 
     Returns:
         (..., items) bool.

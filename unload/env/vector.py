@@ -24,9 +24,9 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     Args:
         physics: ``"table"``, which is the fastest, and so the default here, where picks are made by
-            the million; ``"places"``, ``"local"``, or a ``LocalPhysics`` of your own. Of yours
-            ``simulate`` is called, for each pick that does not repeat a failed one, and ``close``;
-            a ``TablePhysics`` is asked only what neither its table nor a rule answers.
+            the million; ``"places"``, ``"local"``, or a ``LocalPhysics`` of your own. Of it only
+            ``close`` and ``simulate`` are called, the latter for each pick that does not repeat a
+            failed one; a ``TablePhysics`` is asked only what neither its table nor a rule answers.
 
     Attributes:
         physics: what lifts.

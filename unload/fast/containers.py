@@ -1,8 +1,8 @@
 """Many containers in arrays: what a pick does in each of them, compiled.
 
-In a neat load no box moves, so the boxes are sorted by distance once. The 128 nearest are the
-first 128 that are left, and a box that is unloaded makes room for the next one in that order, as
-long as there is one. So a pick touches these 128 at most.
+A failed lift moves nothing, so the boxes of a load are sorted by distance once. The 128 nearest are
+the first 128 that are left, and a box that is unloaded makes room for the next one in that order,
+as long as there is one. So a pick touches these 128 at most.
 """
 
 from typing import NamedTuple
@@ -30,8 +30,9 @@ class Containers(NamedTuple):
         present: (E, capacity) bool, False for items that have been unloaded.
         left, unloaded: (E,) int64, how many items are there, and how many have been taken out.
         seen: (E, capacity, 3) float32, the scaled positions as observed.
-        by_distance: (E, capacity) int32, the items, nearest first. Those that are left begin at
-            index ``unloaded`` when they are sorted anew.
+        by_distance: (E, capacity) int32, the items, nearest first. All before index ``unloaded`` +
+            128 are visible or unloaded. So a list that is sorted anew is written from index
+            ``unloaded`` on.
         visible: (E, 128) int32, the item in each row of the observation, -1 in padded rows.
         values, ranks: (E, 3, 128) float32 and int32, scaled positions and ranks of the rows
             that hold an item.
@@ -108,8 +109,9 @@ def _show(containers, env, rows, equalize, average):
 def look_up(containers, actions, held_down, ruled, digests, micrometres):
     """Each chosen item, (E,) int64, and how far it moves in m, or ``UNKNOWN``, (E,) float64.
 
-    Where the row is padded, the item is -1 and moves by 0. With a ``held_down`` of 0, for a physics
-    that no loop can speak for, only what has failed is known.
+    Where the row is padded, the item is -1 and moves by 0. A ``held_down`` of 0 stands for a
+    physics of which nothing is known (``NOTHING_KNOWN``): then only failed picks that are repeated
+    have an answer here.
     """
     items, distances = np.empty(len(actions), np.int64), np.empty(len(actions))
     capacity = containers.present.shape[1]

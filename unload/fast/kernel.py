@@ -15,11 +15,13 @@ CHUNK = 32  # samples whose gradients are summed in single precision
 _BLOCK = 64  # features handled together: loops of constant length become vector instructions
 _LANES = 16  # features in the longest vector: few enough to keep their sums in registers
 
-# Which item is the lowest and which is the highest matters after the ReLU alone, where all negative
-# values are 0. So items are compared by keys: the bits of a value, read as an integer, whose lowest
-# bits are the item's number. In the order of keys the negative values come first, in reverse, then
-# the positive ones: -0.5, -2, 1, 3. The lowest key is that of -0.5, which becomes 0 like -2, and
-# the highest that of 3.
+# The ReLU makes all negative values 0, so it does not matter which of several negative items counts
+# as the lowest. So items are compared by keys: the bits of a value, read as an integer, whose
+# lowest bits are replaced by the item's number. In the order of keys the negative values come
+# first, in reverse, then the positive ones: -0.5, -2, 1, 3. If any value is negative, the lowest
+# key is that of the negative value nearest to 0, here -0.5, which becomes 0 like all others. A
+# block stores a key as the float32 with the same bits: read as a number it is the value, but for
+# its last digits.
 #
 # A block holds all that is known of _BLOCK features: rows of _BLOCK numbers, one feature a column.
 #

@@ -139,7 +139,7 @@ class Load:
             if (repeated := np.flatnonzero(times[which] > 1)).size:
                 raise BoxError(repeated, "the same id; expected one for each box", misplaced=False)
 
-        # Where there are no thin boxes and none outside, _find_contacts finds those that overlap.
+        # Thin boxes and those outside are refused first, then by _find_contacts those that overlap.
         thin = np.flatnonzero(sizes.min(axis=1) < _SMALLEST_EDGE)
         if thin.size:
             found = f"edges of {sizes[thin[0]]} m; expected >= {_SMALLEST_EDGE} m"
@@ -176,19 +176,16 @@ class Load:
     @cached_property
     def covers(self) -> tuple[np.ndarray, np.ndarray]:
         """All pairs of a box and one above it, (k,) int each, whether it rests there or hangs."""
-        return self._pairs(2, self.positions[:, 2])
+        return self._pairs(2)
 
     @cached_property
     def fronts(self) -> tuple[np.ndarray, np.ndarray]:
         """All pairs of a box and one in front of it, (k,) int each."""
-        return self._pairs(0, self.positions[:, 0] - self.sizes[:, 0] / 2)
+        return self._pairs(0)
 
-    def _pairs(self, axis: int, beyond: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs of a box and one that is larger in ``beyond`` and overlaps it on both other axes.
-
-        Along z the centres say which is the upper one, because boxes that overlap on the other two
-        do not overlap there.
-        """
+    def _pairs(self, axis: int) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs of a box and one farther along ``axis`` that overlaps it on both other axes."""
+        centre = self.positions[:, axis]
         # One row for each of the other axes: NumPy is fast along long rows.
         low, high = self.positions - self.sizes / 2, self.positions + self.sizes / 2
         low, high = (np.delete(corner, axis, axis=1).T.copy() for corner in (low, high))
@@ -196,7 +193,7 @@ class Load:
         for box in range(len(self)):
             shared = np.minimum(high[:, [box]], high) - np.maximum(low[:, [box]], low)
             across = (shared > OVERLAP).all(axis=0)
-            pairs.append(np.flatnonzero(across & (beyond > beyond[box])))
+            pairs.append(np.flatnonzero(across & (centre > centre[box])))
         return np.repeat(np.arange(len(self)), [*map(len, pairs)]), np.concatenate(pairs)
 
     def __deepcopy__(self, memo: dict) -> "Load":
@@ -293,7 +290,7 @@ def _find_contacts(
     return Contacts(*_lists(rows, len(low)))
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def _find(low, high, order, ends, tolerance):
     """Rows (kind, box, box that touches it), and two boxes that overlap; 0 twice if none do.
 
@@ -322,7 +319,8 @@ def _find(low, high, order, ends, tolerance):
                 if min(overlap_y, overlap_z, overlap_x) > OVERLAP:
                     return rows[:count], order[i], order[j]
 
-                # They touch if they share depth, and besides either width or height.
+                # They touch if they share depth, and besides either width or height: not where only
+                # edges meet, nor front to rear, since walls do not hold each other.
                 if max(overlap_y, overlap_z) <= CONTACT_TOLERANCE or overlap_x <= CONTACT_TOLERANCE:
                     continue
                 one, other = BESIDE, BESIDE  # what j is to i, and i to j
@@ -338,19 +336,19 @@ def _find(low, high, order, ends, tolerance):
     return rows[:count], 0, 0
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def _lists(rows, count):
-    """``starts`` and ``links`` of ``Contacts``."""
+    """``starts`` and ``links`` of ``Contacts``: a counting sort of the rows by kind and box."""
     starts = np.zeros((3, count + 1), np.int32)
     for row in range(len(rows)):
         starts[rows[row, 0], rows[row, 1]] += 1
     total = 0
-    for kind in range(3):  # from the number of a box's contacts to the end of its list
+    for kind in range(3):  # the number of a box's contacts becomes where its list ends
         for box in range(count + 1):
             total += starts[kind, box]
             starts[kind, box] = total
     links = np.empty(total, np.int32)
-    for row in range(len(rows)):  # fills each list from its end, which leaves its start
+    for row in range(len(rows)):  # lists are filled backwards, so that in the end they start there
         kind, box = rows[row, 0], rows[row, 1]
         starts[kind, box] -= 1
         links[starts[kind, box]] = rows[row, 2]

@@ -48,8 +48,8 @@ RIGHT = (
 # One row of a wall, from left to right: (left edge in cells, variants of the substack). A left
 # substack's upper boxes end where the next one begins.
 COLUMNS = ((0, LEFT), (6, MID), (16, MID), (26, RIGHT))
-# Of each column and variant, (4, 3), the number of items; and (4, 3, m, 3) int64, each item's
-# package, left edge in the row and lower edge, filled up with zeros.
+# _COUNTS[column, variant] is the number of items. _CELLS[column, variant, k] holds the package of
+# item k, its left edge in the row and its lower edge; zeros where there are fewer items.
 _COUNTS = np.array([[len(variant) for variant in variants] for _, variants in COLUMNS])
 _CELLS = np.zeros((*_COUNTS.shape, _COUNTS.max(), 3), np.int64)
 for _column, (_left, _variants) in enumerate(COLUMNS):

@@ -21,7 +21,8 @@ def write_weights(path: str | Path, kind: str, settings: dict, tensors: dict) ->
 
     Args:
         kind: what the file holds, such as ``"policy"``.
-        settings, tensors: as JSON can hold them; by name, float32 or it is a TypeError.
+        settings: what JSON can hold.
+        tensors: float32, by name; others raise TypeError.
     """
     path = checks.file("path", path)
     content = weights_file(kind, settings, tensors)

@@ -1,5 +1,5 @@
 """Packing lists and orders of picks: geometry alone, without a lift and without an agent.
 
-Skip this room unless you have a list. Read ``table``, ``settling``, ``packing_list``, ``order``
+They are needed for packing lists alone. Read ``table``, ``settling``, ``packing_list``, ``order``
 and ``command``, in this order.
 """

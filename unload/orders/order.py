@@ -114,15 +114,15 @@ def _reachable_first(load: Load, stops: np.ndarray | None) -> np.ndarray:
     preferred = np.lexsort(keys if stops is None else [*keys, _due(load, stops)])
     turns = np.argsort(preferred).tolist()
 
-    # How many boxes block each one, and which ones it blocks: first from above, then from in front.
-    blocking, blocked = [], []
+    # How many boxes each one waits for, and which ones it frees: those above, then those in front.
+    waits_for, frees = [], []
     for boxes, others in (load.covers, load.fronts):
-        blocking.append(np.bincount(boxes, minlength=len(load)))
+        waits_for.append(np.bincount(boxes, minlength=len(load)))
         ends = np.cumsum(np.bincount(others, minlength=len(load)))
-        blocked.append(np.split(boxes[np.argsort(others)], ends[:-1]))
+        frees.append(np.split(boxes[np.argsort(others)], ends[:-1]))
 
     def key(box: int) -> tuple[bool, bool, int]:
-        return bool(blocking[0][box]), bool(blocking[1][box]), turns[box]
+        return bool(waits_for[0][box]), bool(waits_for[1][box]), turns[box]
 
     # Blocked boxes are in the heap, too, behind all free ones: where boxes wait for each other in a
     # circle none is free, and the rule picks a blocked one. A box that has become free is pushed
@@ -134,10 +134,10 @@ def _reachable_first(load: Load, stops: np.ndarray | None) -> np.ndarray:
         if present[item]:
             present[item] = False
             order.append(item)
-            for counts, lists in zip(blocking, blocked):
-                under_or_behind = lists[item]
-                counts[under_or_behind] -= 1
-                for box in under_or_behind[counts[under_or_behind] == 0]:
+            for counts, lists in zip(waits_for, frees):
+                others = lists[item]
+                counts[others] -= 1
+                for box in others[counts[others] == 0]:
                     heappush(heap, key(box))
     return np.array(order)
 

@@ -66,7 +66,7 @@ def read_load(
         columns: name in the list → name above, for other names: ``{"Länge": "size_x"}``.
         tolerance: in m, up to 0.1, how far each box may be from where it belongs, see
             ``unload.orders.settling.settle``. How many were moved and how far is logged, and
-            which overlaps this may hide. A box touches whatever is so little below it.
+            which overlaps this may hide. A box lies on any whose top is at most so far below it.
         container: (3,) its inner length, width and height in m; by default the paper's.
         x_from: ``"rear"``, or ``"door"`` if x counts from there to the box's front or centre.
         header: of a file, the number of the line of names, if a title stands above; empty lines
@@ -125,7 +125,8 @@ def read_load(
             count, most = edits.any(axis=1).sum(), 1000 * np.linalg.norm(edits, axis=1).max()
             LOGGER.warning("%d of %d boxes %s up to %.1f mm", count, len(load), what, most)
     if moves.any() or smaller.any():
-        # Each edge of two boxes may be elsewhere, by its fault and by what mended it.
+        # Two boxes may overlap by twice their fault, the largest move, and half of what an edge
+        # lost.
         hidden = 2000 * (tolerance + np.abs(moves).max() + smaller.max() / 2)
         LOGGER.warning("An order may overlook overlaps of up to %.0f mm", hidden)
     return load
@@ -190,6 +191,8 @@ class _Rows:
         """Refuse lengths in mm such as 1.200, unless another one shows what the mark is of."""
         lengths = (*self.place, *SIZES)
         in_mm = self._table[[self.names[name] for name in lengths if self._unit(name) == "mm"]]
+        # 1.200 may be 1200 with a mark of thousands; in 0.000 and 1200.5 it can be of decimals
+        # only.
         texts = [cell for cell in in_mm.to_numpy().ravel() if isinstance(cell, str)]
         unclear = [cell for cell in texts if re.fullmatch(r"-?[1-9]\d{0,2}\.\d{3}", cell)]
         if unclear and not any(re.match(r"-?(0|\d{4,})\.", cell) for cell in texts):
@@ -210,6 +213,7 @@ def _columns_by_meaning(names: list, columns: Mapping[str, str]) -> dict[str, st
             raise ListError(f"the list has the columns {names!s:.1000}; expected one {meaning!r}")
         by_meaning[meaning] = name
     missing = ", ".join(name for name in SIZES if name not in by_meaning)
+    # Both kinds of place, or neither.
     if ({*CENTRE} <= {*by_meaning}) == ({*CORNER} <= {*by_meaning}):
         missing = "either x, y, z or x_min, y_min, z_min"
     if missing:

@@ -32,8 +32,8 @@ def settle(
     start[:, 2] = _bottoms(low, sizes, tolerance)
     end[:, 2] = start[:, 2] + sizes[:, 2]
 
-    # Those that share height now are pushed apart, along x first, and those that share depth then
-    # along y.
+    # Boxes that now share height are pushed apart along x; then along y those that now share both
+    # height and depth.
     for axis in (0, 1):
         rows = _rows(axis, low, high, start, end, tolerance)
         room = container[axis]
@@ -80,8 +80,10 @@ def _rows(axis: int, low, high, start, end, tolerance: float) -> Rows:
     low, high, start, end = (corners[order] for corners in (low, high, start, end))
     for place, box in enumerate(order):
         share, settled = _shared(low, high, place), _shared(start, end, place)
+        # One stands before the other: apart along this axis, but for the fault of both, and at one
+        # height. Pairs that overlap less along y are pushed apart there, or need not be.
         beside = (share[:, axis] <= 2 * tolerance) & (settled[:, 2] > OVERLAP)
-        if axis == 0:  # along y otherwise, or nowhere
+        if axis == 0:
             beside &= (share[:, 0] <= share[:, 1]) & (share[:, 1] > -2 * tolerance)
         else:  # what is apart along x needs nothing along y
             beside &= settled[:, 0] > OVERLAP
@@ -104,7 +106,8 @@ def _fitting(edges: np.ndarray, rows: Rows, room: float, tolerance: float) -> np
     1.004 m, and the room has 2 m. So ``rows`` is [(A, []), (B, [A])], the row is 2.004 m long, and
     both become shorter by 0.2 %: 0.998 and 1.002 m.
     """
-    before, after = np.zeros(len(edges)), np.zeros(len(edges))  # how long it is, without the box
+    # The greatest length of the boxes that stand before each one in a row, and after it.
+    before, after = np.zeros(len(edges)), np.zeros(len(edges))
     for box, others in rows:
         before[box] = (before[others] + edges[others]).max(initial=0)
     for box, others in rows[::-1]:
@@ -143,7 +146,8 @@ def uncarried(load: Load) -> np.ndarray:
         start = np.maximum(low[below], low[box]) - centre + SLACK
         end = np.minimum(high[below], high[box]) - centre - SLACK
         x, y = (np.stack([start[:, axis], end[:, axis]]) for axis in (0, 1))
-        # Corners all around the centre leave no half of the directions without one.
+        # The centre lies within them if, seen from it, no two neighbouring corners are half a turn
+        # or more apart.
         angles = np.sort(np.arctan2(y[:, np.newaxis], x).ravel())
         if not below.size or np.diff(angles, append=angles[0] + 2 * np.pi).max() >= np.pi:
             tipping.append(box)

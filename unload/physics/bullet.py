@@ -91,7 +91,7 @@ SETTINGS = {
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # orientation of a box that is not turned
 ITERATIONS = 50
-# s, after which a pull may be given up, again and again: 16 of its 72 steps tell most that fail.
+# A pull is asked whether it is hopeless every so many s: 16 of its 72 steps tell most that fail.
 ASKED_EVERY = 16 * TIME_STEP
 
 

@@ -23,8 +23,8 @@ class LocalPhysics:
 
     The chosen box and all that rests on it are free to move; what they stand on, their
     neighbours in the wall, the floor and the side walls are fixed; the rest is left out.
-    A failed lift has no effect on the container (Sec. III-D). What was lifted before makes no
-    difference, not in one bit, so that any number of containers may share one.
+    A failed lift has no effect on the container (Sec. III-D). A lift does not depend on earlier
+    ones, not in one bit, so that any number of containers may share one.
 
     Args:
         engine: ``"pybullet"`` or ``"mujoco"``; PyBullet where it is installed if None.
@@ -39,7 +39,10 @@ class LocalPhysics:
 
     @property
     def known(self) -> tuple[int, bool, np.ndarray, np.ndarray] | None:
-        """What compiled loops may answer by, without ``simulate``; see ``TablePhysics``."""
+        """What compiled loops may answer by, without ``simulate``, see ``TablePhysics.known``.
+
+        With None, ``simulate`` is asked about every lift.
+        """
         return None
 
     def simulate(self, situation: Situation) -> float:

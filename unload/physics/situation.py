@@ -94,13 +94,13 @@ class Surroundings:
         return situation_in(*contacts, self._geometry, self.load.container[1], item)
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def key_length(boxes):
     """The greatest number of words in the key of a situation of so many boxes, with two sides."""
     return 5 + 6 * boxes
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def find_movers(starts, links, present, item, members, most):
     """How many boxes a lift moves: the item and all on top of it, at most ``most``.
 
@@ -124,7 +124,7 @@ def find_movers(starts, links, present, item, members, most):
     return dynamic
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def find_touching(starts, links, present, members, dynamic):
     """How many boxes decide a lift: those that it moves, and what they stand on or may rub against.
 
@@ -146,7 +146,7 @@ def find_touching(starts, links, present, members, dynamic):
     return count
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def write_key(geometry, right, members, dynamic, key):
     """Write the words of ``Situation.key``; return how many there are.
 
@@ -207,22 +207,23 @@ def situation_in(
     )
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def parts_of_key(key):
     """Where in a situation's key its side walls begin, and where its boxes, see ``Situation.key``.
 
-    Each box takes six words, and there are two side walls at most.
+    Each box takes six words, and there are two side walls at most: so what is left of the length
+    after the floor, divided by six, is the number of side walls.
     """
     sides = 2 + key[1]
     return sides, sides + (len(key) - sides) % 6
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def _micrometres(length):
     return np.int32(np.rint(length / RESOLUTION))
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def _holds(members, end, box):
     for i in range(end):
         if members[i] == box:
@@ -230,7 +231,7 @@ def _holds(members, end, box):
     return False
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def _insert(members, first, end, box):
     """Put a box into its place among the sorted ``members[first:end]``; the new end."""
     place = end
@@ -241,7 +242,7 @@ def _insert(members, first, end, box):
     return end + 1
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def digest_of(words):
     """The digest of a situation's key, (k,) int32: never 0."""
     digest = np.uint64(len(words))

@@ -28,15 +28,17 @@ PhysicsName = Literal["local", "places", "table"]
 
 UNKNOWN = -1  # in place of a distance that is not in the table
 HELD_DOWN = 3  # so many boxes on top hold a box down
-# One or two hold it down, too, if they press on its middle. Along x and along y, let 0 be its
-# centre and 1 its edge: so far out may they press on average. A box on top presses at its own
-# centre, which must lie above the chosen box. Only of two that lie on it side by side may a centre
-# lie beyond the edge: this one presses there, if its far end lies on another box.
+# One or two boxes on top hold the chosen box down, too, if they press near its centre. Measured
+# along one axis, 0 is the centre of the chosen box and 1 its edge. A box on top presses at its own
+# centre; the mean of these points must lie within ±MIDDLE along x and along y. A box whose centre
+# lies beyond the edge counts as pressing at the edge, but only if it is a bridge (see
+# ``_bridges``): two boxes lie side by side on the chosen one, and the far end of this one lies on
+# another box.
 MIDDLE = 0.5
-# A box between two others cannot tip sideways. So along y those on top may press on it anywhere, on
-# average, from edge to edge. The box counts as between others if they cover at least this share of
-# its left and of its right face, and if it is at most so many times as wide as high: a flatter one
-# tips within the gaps.
+# A box that stands between others cannot tip sideways. So along y the mean may lie anywhere from
+# edge to edge. A box counts as between others if they cover at least this share of its left and of
+# its right face, and if it is at most so many times as wide as high: a flatter one tips within the
+# gaps.
 COVERED = 0.5
 FLAT = 4.0
 NEAR = CONTACT_TOLERANCE / RESOLUTION  # micrometres between faces that touch, at most
@@ -185,8 +187,9 @@ class TablePhysics(LocalPhysics):
 def hopeless(moved: float, speed: float, left: float) -> bool:
     """Whether a pull will not lift a box any more.
 
-    It cannot if a free rise from now on were too short. It will not if the box, with the mean
-    acceleration that it has had, would reach a quarter of the threshold at most (``HARDLY``).
+    It is hopeless if even a free rise for the rest of the time would end below the threshold, or if
+    the box, with the mean acceleration that it has had so far, would reach no more than a quarter
+    of the threshold (``HARDLY``).
 
     Args:
         moved: m, so far.
@@ -228,7 +231,7 @@ def _inserted(array: np.ndarray, place: np.integer, value: int | np.integer) -> 
     return np.concatenate((array[:place], array.dtype.type(value)[np.newaxis], array[place:]))
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def find_distance(digests, micrometres, digest):
     """The distance of a digest in micrometres, or ``UNKNOWN``."""
     place = np.searchsorted(digests, digest)
@@ -236,7 +239,7 @@ def find_distance(digests, micrometres, digest):
     return micrometres[place] if known else UNKNOWN
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def held_by_rule(key):
     """Whether what lies on the chosen box, one box or two, holds it down for certain.
 
@@ -253,7 +256,7 @@ def held_by_rule(key):
     return _presses_within(key, first, MIDDLE, MIDDLE) or _between_others(key, first)
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def _presses_within(key, first, along_x, along_y):
     """Whether the boxes on top press on the chosen one so near its centre, on average.
 
@@ -278,20 +281,21 @@ def _presses_within(key, first, along_x, along_y):
     return True
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def _bridges(key, first, box, axis):
     """Whether two lie side by side on the chosen box, and this one's far end on another box."""
-    if key[0] != 3:
+    if key[0] != 3:  # the chosen box and two on top
         return False
-    for upper in (first + 6, first + 12):
+    for upper in (first + 6, first + 12):  # both lie on the chosen box itself
         if abs(key[upper + 2] - (key[upper + 5] + key[first + 5]) / 2) > NEAR:
             return False
     upper = first + 6 * box
     side = 1 if key[upper + axis] > 0 else -1
-    for lower in range(first + 18, len(key), 6):
+    for lower in range(first + 18, len(key), 6):  # the boxes that cannot move
         x = _shared(key[lower] - key[upper], key[lower + 3], key[upper + 3])
         y = _shared(key[lower + 1] - key[upper + 1], key[lower + 4], key[upper + 4])
         gap = key[upper + 2] - key[lower + 2] - (key[upper + 5] + key[lower + 5]) / 2
+        # How far the lower box reaches beyond the far end of the upper one.
         beyond = side * (key[lower + axis] - key[upper + axis])
         beyond += (key[lower + 3 + axis] - key[upper + 3 + axis]) / 2
         if x > 0 and y > 0 and abs(gap) <= NEAR and beyond >= -NEAR:
@@ -299,7 +303,7 @@ def _bridges(key, first, box, axis):
     return False
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def _between_others(key, first):
     """Whether boxes or side walls cover both sides of the chosen box, see ``COVERED``."""
     depth, width, height = key[first + 3], key[first + 4], key[first + 5]
@@ -325,7 +329,7 @@ def _between_others(key, first):
     return min(left, right) >= COVERED
 
 
-@compiled(plain=True)
+@compiled(lazy=True)
 def _shared(centre, length, edge):
     """The share of an edge around 0 that an interval covers; below 0 if it does not."""
     return (min(centre + length / 2, edge / 2) - max(centre - length / 2, -edge / 2)) / edge

@@ -33,7 +33,7 @@ def instance(name: str, value: object, kind: Any, expected: str) -> Any:
 
 
 def one_of(name: str, value: object, options: Iterable[_Option]) -> _Option:
-    """Return the one of ``options`` that ``value`` is; raise ValueError if it is none."""
+    """Return the option that equals ``value``; raise ValueError if there is none."""
     options = list(options)
     single = isinstance(value, Hashable) and getattr(value, "shape", ()) == ()  # no array or tensor
     if not (single and value in options):

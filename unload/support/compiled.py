@@ -26,19 +26,20 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 _SOURCES = ("task.py", "support/compiled.py", "load/boxes.py", "physics/*.py", "fast/*.py")
 
 
-def compiled(function: Callable | None = None, plain: bool = False, **options) -> "Compiled":
+def compiled(function: Callable | None = None, lazy: bool = False, **options) -> "Compiled":
     """``numba.njit`` of a function in one of ``_SOURCES``, with a cache that follows all of them.
 
     ``options`` are those of ``numba.njit``, as in ``@compiled(nogil=True)``. Functions are compiled
     at their first call, in a fresh installation for ten seconds in all; this is logged once, when
     the folder is made. Where none can be written, compiled code is kept in memory, with a warning.
 
-    A ``plain`` function runs in Python until another one, or one that calls it, is compiled in this
-    process: an order of picks, which needs no other, calls it too seldom to be worth compiling.
+    A ``lazy`` function runs as ordinary Python as long as nothing has been compiled in this
+    process, and is compiled like all others from then on. So an order of picks, which needs lazy
+    functions alone and calls them seldom, does not load numba.
     """
     if function is None:
-        return partial(compiled, plain=plain, **options)  # type: ignore[return-value]
-    return Compiled(function, plain, options)
+        return partial(compiled, lazy=lazy, **options)  # type: ignore[return-value]
+    return Compiled(function, lazy, options)
 
 
 class Compiled:
@@ -46,12 +47,12 @@ class Compiled:
 
     any_compiled = False  # of all these functions, in this process
 
-    def __init__(self, function: Callable, plain: bool, options: dict) -> None:
+    def __init__(self, function: Callable, lazy: bool, options: dict) -> None:
         update_wrapper(self, function)
-        self._function, self._plain, self._options = function, plain, options
+        self._function, self._lazy, self._options = function, lazy, options
 
     def __call__(self, *given):
-        if self._plain and not Compiled.any_compiled:
+        if self._lazy and not Compiled.any_compiled:
             with np.errstate(over="ignore"):  # integers wrap, as compiled ones do
                 return self._function(*given)
         return self.dispatcher(*given)

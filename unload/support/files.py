@@ -134,7 +134,7 @@ def write_nested(path: str | Path, value: Any) -> None:
 
 
 def _storable(value: Any, arrays: dict[str, np.ndarray], place: tuple) -> Any:
-    """What JSON gives back as it was; of an array its name, under which it is put aside."""
+    """What JSON gives back as it was; arrays go into ``arrays``, and their names stand for them."""
     if isinstance(value, np.generic) and value.dtype.kind in "biufU":
         value = value.item()
     kind = type(value)

@@ -80,6 +80,8 @@ def test_the_published_answers_are_right_and_of_todays_bounds():
     assert rows.loc["all", "lifts"] == len(frame) == rows["lifts"].sum() / 2
     assert rows.loc["all", "at most"] < 0.001
     assert (frame["part"] == "drawn anew").sum() >= 3000
+    assert {*frame.loc[frame["part"] == "rare", "answer"]} == {*certain.RARE}
+    assert (rows.loc[[*certain.RARE], "at most"] < 0.02).all()
 
 
 def test_wrong_answers_are_counted():
