@@ -34,7 +34,7 @@ HELD_DOWN = 3  # so many boxes on top hold a box down
 # lies beyond the edge counts as pressing at the edge, but only if it is a bridge (see
 # ``_bridges``): two boxes lie side by side on the chosen one, and the far end of this one lies on
 # another box.
-MIDDLE = 0.5
+MIDDLE = 0.45
 # A box that stands between others cannot tip sideways. So along y the mean may lie anywhere from
 # edge to edge. A box counts as between others if they cover at least this share of its left and of
 # its right face, and if it is at most so many times as wide as high: a flatter one tips within the
@@ -241,7 +241,10 @@ def find_distance(digests, micrometres, digest):
 
 @compiled(lazy=True)
 def held_by_rule(key):
-    """Whether what lies on the chosen box, one box or two, holds it down for certain.
+    """Whether what lies on the chosen box, one box or two, holds it down.
+
+    In random loads and random stacks of boxes of any proportions, no lift contradicts this
+    (``studies.lifts.certain``); a search for boxes that do finds some.
 
     The pull raises 1.04 boxes besides the chosen one. So one on its middle rises by 9 mm, and off
     it, it tips aside, unless it stands between others; two hold it down even if their other ends
@@ -283,22 +286,25 @@ def _presses_within(key, first, along_x, along_y):
 
 @compiled(lazy=True)
 def _bridges(key, first, box, axis):
-    """Whether two lie side by side on the chosen box, and this one's far end on another box."""
-    if key[0] != 3:  # the chosen box and two on top
+    """Whether two lie side by side on the chosen box, and this one's far end on another box.
+
+    On the other horizontal axis its centre must lie above both that carry it: then it cannot tip
+    about a corner.
+    """
+    upper, across = first + 6 * box, 1 - axis
+    if key[0] != 3 or 2 * abs(key[upper + across]) > key[first + 3 + across]:
         return False
-    for upper in (first + 6, first + 12):  # both lie on the chosen box itself
-        if abs(key[upper + 2] - (key[upper + 5] + key[first + 5]) / 2) > NEAR:
+    for on in (first + 6, first + 12):  # the two on top, both on the chosen box itself
+        if abs(key[on + 2] - (key[on + 5] + key[first + 5]) / 2) > NEAR:
             return False
-    upper = first + 6 * box
     side = 1 if key[upper + axis] > 0 else -1
     for lower in range(first + 18, len(key), 6):  # the boxes that cannot move
-        x = _shared(key[lower] - key[upper], key[lower + 3], key[upper + 3])
-        y = _shared(key[lower + 1] - key[upper + 1], key[lower + 4], key[upper + 4])
+        away, edge = side * (key[lower + axis] - key[upper + axis]), key[lower + 3 + axis]
+        touches = _shared(away, edge, key[upper + 3 + axis]) > 0
         gap = key[upper + 2] - key[lower + 2] - (key[upper + 5] + key[lower + 5]) / 2
-        # How far the lower box reaches beyond the far end of the upper one.
-        beyond = side * (key[lower + axis] - key[upper + axis])
-        beyond += (key[lower + 3 + axis] - key[upper + 3 + axis]) / 2
-        if x > 0 and y > 0 and abs(gap) <= NEAR and beyond >= -NEAR:
+        carries = 2 * abs(key[lower + across] - key[upper + across]) <= key[lower + 3 + across]
+        reaches = away + (edge - key[upper + 3 + axis]) / 2 >= -NEAR
+        if touches and abs(gap) <= NEAR and carries and reaches:
             return True
     return False
 
