@@ -41,9 +41,9 @@ def any_allowed(allowed: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 def choosable(masks: np.ndarray, present: np.ndarray) -> np.ndarray:
     """The masks, and where one excludes all, the items that are present.
 
-    Both are (batch, 128), bool or 0 and 1, and so is what is returned. A load of upright
-    boxes in walls, as the paper's, always has a box that can be lifted; with others a container may
-    get stuck, and its episode still has picks to make.
+    Both are (batch, 128), bool or 0 and 1, and so is what is returned. A load of upright boxes in
+    walls, as the paper's, always has a box that can be lifted; with others a container may get
+    stuck, and its episode still has picks to make.
     """
     return masks | present & ~masks.any(axis=1, keepdims=True)
 

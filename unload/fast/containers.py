@@ -1,8 +1,9 @@
 """Many containers in arrays: what a pick does in each of them, compiled.
 
-A failed lift moves nothing, so the boxes of a load are sorted by distance once. The 128 nearest are
-the first 128 that are left, and a box that is unloaded makes room for the next one in that order,
-as long as there is one. So a pick touches these 128 at most.
+A failed lift moves nothing, so the boxes of a load are sorted by distance once. (With
+``FullPhysics("keep")`` boxes move, and are sorted anew after each pick.) The 128 nearest are the
+first 128 that are left, and a box that is unloaded makes room for the next one in that order, as
+long as there is one. So a pick touches these 128 at most.
 """
 
 from typing import NamedTuple
