@@ -89,8 +89,8 @@ def read_load(
     container = checks.finite_array("container", container, (3,))
     checks.entries("columns", {} if columns is None else columns, ())
     header = checks.integer("header", header, 1)
-    rows = _Rows(read_table(path, header), columns or {}, units)
-    centres, sizes = rows.boxes()
+    listed = _List(read_table(path, header), columns or {}, units)
+    centres, sizes = listed.boxes()
     if x_from == "door":
         centres[:, 0] = container[0] - centres[:, 0]
 
@@ -100,9 +100,9 @@ def read_load(
         load = Load(
             centres + moves,
             sizes - smaller,
-            ids=rows.ids,
+            ids=listed.ids,
             container=container,
-            extras=rows.extras(),
+            extras=listed.extras(),
             contact_tolerance=max(tolerance, CONTACT_TOLERANCE),
         )
         check_supported(load)
@@ -111,15 +111,15 @@ def read_load(
         problem, argument = error.problem, "tolerance"
         if outside.max() > 2 * container.max():  # so far outside that the unit must be wrong
             argument = "units"
-        elif rows.place is CENTRE and centres[:, 2].min() <= tolerance:
-            corners = ", ".join(f"{rows.names[c]}={corner}" for c, corner in zip(CENTRE, CORNER))
+        elif listed.place is CENTRE and centres[:, 2].min() <= tolerance:
+            corners = ", ".join(f"{listed.names[c]}={corner}" for c, corner in zip(CENTRE, CORNER))
             problem += f"; if these are no centres but corners: {corners}"
             argument = "columns"
         elif outside.max() > LARGEST_TOLERANCE:
             argument = "container"
-        rows.refuse(np.array(error.boxes), problem, argument if error.misplaced else None)
+        listed.refuse(np.array(error.boxes), problem, argument if error.misplaced else None)
     if (tipping := uncarried(load)).size:
-        rows.refuse(tipping, "tips, because nothing carries its centre of mass", "tolerance")
+        listed.refuse(tipping, "tips, because nothing carries its centre of mass", "tolerance")
     for edits, what in ((moves, "moved by"), (smaller, "taken for smaller, by")):
         if edits.any():
             count, most = edits.any(axis=1).sum(), 1000 * np.linalg.norm(edits, axis=1).max()
@@ -132,8 +132,8 @@ def read_load(
     return load
 
 
-class _Rows:
-    """The rows of a list by what its columns mean; a refusal names some of them and their ids.
+class _List:
+    """A packing list by what its columns mean; a refusal names rows and their ids.
 
     Attributes:
         names: of the columns, by their meaning.

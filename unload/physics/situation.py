@@ -211,8 +211,8 @@ def situation_in(
 def parts_of_key(key):
     """Where in a situation's key its side walls begin, and where its boxes, see ``Situation.key``.
 
-    Each box takes six words, and there are two side walls at most: so what is left of the length
-    after the floor, divided by six, is the number of side walls.
+    Each box takes six words, and there are two side walls at most. So the number of words after the
+    floor, divided by six, leaves the number of side walls as its remainder.
     """
     sides = 2 + key[1]
     return sides, sides + (len(key) - sides) % 6
