@@ -44,6 +44,7 @@ COLUMNS = [
     "part", "family", "on_top", "common", "farthest", "answer", *ENGINES,
     *(f"table_{engine}" for engine in ENGINES),
 ]  # fmt: skip
+COLOURS = dict(zip((*FAMILIES, *STACKS), ("C0", "C1", "C2", "C3", "C4", "C5", "#e377c2")))
 BOUNDS = ("middle", "covered", "flat", "hardly")  # see ``physics.table``
 ANSWERS = (
     "three or more on top", "on its middle", *RARE, "given up early", "simulated to the end",
@@ -120,15 +121,16 @@ def over_middle(frame: pd.DataFrame) -> Figure:
 
     Args:
         frame: see ``certain_data``. The rule answers filled dots: those in the shaded part, and
-            others of boxes that stand between two.
+            others that lie side by side or between two.
     """
     figure, panels = plt.subplots(1, HELD_DOWN - 1, figsize=(9, 3.6), sharex=True, sharey=True)
     for on_top, axes in enumerate(panels, 1):
         lifts = frame[frame["on_top"] == on_top]
-        for number, (family, group) in enumerate(lifts.groupby("family", sort=False)):
+        for family, colour in COLOURS.items():
+            group = lifts[lifts["family"] == family]
             ruled = group["answer"].isin(ANSWERS[1:4])
-            for some, face in ((group[ruled], f"C{number}"), (group[~ruled], "none")):
-                dots = {"s": 14, "edgecolor": f"C{number}", "facecolor": face, "linewidth": 0.7}
+            for some, face in ((group[ruled], colour), (group[~ruled], "none")):
+                dots = {"s": 14, "edgecolor": colour, "facecolor": face, "linewidth": 0.7}
                 label = family if face == "none" else None
                 axes.scatter(some["common"], some[ENGINES[0]], label=label, **dots)
         axes.axvspan(0, MIDDLE, color="0.93", zorder=0)
@@ -136,7 +138,7 @@ def over_middle(frame: pd.DataFrame) -> Figure:
         axes.set(xlim=(0, MAX_OFFSET), xlabel="common centre off the middle (half edges)")
         axes.set_title("one box on top" if on_top == 1 else f"{on_top} boxes on top", fontsize=9)
     panels[0].set_ylabel("distance moved (m)")
-    panels[0].legend(fontsize=8)
+    panels[0].legend(fontsize=7, labelspacing=0.25)
     return figure
 
 
