@@ -13,7 +13,6 @@ from studies.falls import cells, laboratory, long, measures
 from studies.falls.laboratory import CONFIG
 from studies.grid import read_policies
 from studies.paper.training import PAPER
-from studies.policies.margin import own_scores
 from studies.results import read_provenance, read_table
 from unload import evaluate
 from unload.agent.training import Training
@@ -142,15 +141,6 @@ def network():
 @pytest.fixture
 def observations(rng):
     return rng.uniform(-1, 1, (40, 128, 3)).astype(np.float32)
-
-
-def test_slopes_are_those_of_the_scores_of_high_boxes(observations):
-    network = PEQNetwork(16, torch.Generator().manual_seed(0)).double()
-    seen = observations.astype(float)
-    high = seen[seen[..., 2] > np.median(seen[..., 2])]
-    steps = 1e-6 * np.eye(3)
-    rises = [own_scores(network, high + step) - own_scores(network, high - step) for step in steps]
-    assert measures.slopes(network, seen) == pytest.approx(np.mean(rises, axis=1) / 2e-6, abs=1e-6)
 
 
 def test_tilt_is_the_effect_of_place_at_equal_height(observations):

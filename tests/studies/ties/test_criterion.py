@@ -13,7 +13,6 @@ from studies.results import read_provenance, read_table
 from studies.ties import training
 from studies.ties.criterion import FIG11, FIG12, READINGS, likeness, noisier_readings, scatter
 from studies.ties.laboratory import CELLS
-from studies.ties.noise import told_by_rank
 from tests.studies.test_statistics import course
 
 # Of ten million picks in twenty windows: falls, rises, sinks slowly; the MSR becomes slower and
@@ -103,12 +102,3 @@ def test_the_runs_of_the_first_plan_are_all_there():
     twenty = table[table["cell"].isin(training.EARLIER.cells)].set_index(["cell", "seed"])["end"]
     late = curves[curves["picks"] > 18_000_000].groupby(["cell", "seed"])["success_rate"].mean()
     assert len(late) == 20 and np.allclose(late.sort_index(), twenty.sort_index(), atol=1e-4)
-
-
-@pytest.mark.parametrize("ties", ["order", "noise"])
-def test_order_tells_which_box_is_the_upper_one(ties):
-    told = told_by_rank(700, ties)
-    if ties == "order":
-        assert told["upper"] == told["pairs"] and told["spearman"] < -0.8
-    else:
-        assert told["upper"] == pytest.approx(told["pairs"] / 2, rel=0.3)
