@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 import torch
 
-from studies import paths
+from studies import grid, paths
 from studies.falls import cells, laboratory, long, measures
 from studies.falls.laboratory import CONFIG
 from studies.grid import read_policies
@@ -105,9 +105,10 @@ def test_policies_and_networks_are_judged_alike(own_data, set_in):
     """One published policy and one network without training, in one container with the mask."""
     name = "paper_no_mask/seed_0"
     policy = read_policies(paths.ROOT / "data/falls/paper.safetensors")[name]
-    published = {"paper": {name: policy}, "long": {}}
-    set_in(long, read_policies=lambda path: published[path.stem], training_fingerprint=lambda: "f")
-    set_in(long, UNTRAINED=1, LOADS={"episodes": 1, "seed": 0})
+    published = {PAPER.name: {name: policy}, long.LONG.name: {}}
+    set_in(long, policies_of=lambda of: published[of.name], UNTRAINED=1)
+    set_in(long, LOADS={"episodes": 1, "seed": 0})
+    set_in(grid, training_fingerprint=lambda: "f")
     long.published_data(n_jobs=1)
     trained, drawn = read_table("falls/published").itertuples()
     assert (trained.cell, drawn.cell) == ("paper_no_mask", "untrained")
@@ -115,7 +116,7 @@ def test_policies_and_networks_are_judged_alike(own_data, set_in):
     assert trained.judged_as_is == evaluate(policy, 1, 0, mask=True)["success_rate"].mean()
     policy.network.scorer.weight.data[0, 0] += 1  # another network of the same name
     long.published_data(n_jobs=1)
-    assert len([*(own_data / "runs/published").rglob("*.npz")]) == 3
+    assert len([*(own_data / "runs/falls/published").rglob("*.npz")]) == 3
 
 
 def test_the_published_table_holds_every_policy():

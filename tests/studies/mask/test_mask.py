@@ -8,7 +8,7 @@ import pytest
 
 from studies import paths
 from studies.grid import cell_of, read_policies, read_provenance
-from studies.mask import cells, laboratory, training
+from studies.mask import cells, laboratory
 from studies.results import read_table
 from unload import PEQNetwork, evaluate, task
 from unload.agent.greedy import Greedy
@@ -65,5 +65,5 @@ def test_a_published_network_is_judged_as_it_is_said_to_be():
     assert len(rows) == len(policies) == read_provenance("mask/runs")["runs"]
     name = next(iter(policies))
     said = rows.loc[cell_of(name), int(name.rpartition("_")[2])]
-    (judged,) = training.ask_by_stage(policies[name], episodes=5, seed=1)
+    (judged,) = laboratory.ask_by_stage(policies[name], episodes=5, seed=1)
     assert judged["msr"] == pytest.approx(said["msr"], abs=0.1)
