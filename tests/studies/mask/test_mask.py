@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from studies import paths
-from studies.grid import cell_of, read_policies, read_provenance
+from studies.grid import cell_of, read_policies
 from studies.mask import cells, laboratory
 from studies.results import read_table
 from unload import PEQNetwork, evaluate, task
@@ -62,7 +62,7 @@ def test_a_network_is_judged_by_stage():
 def test_a_published_network_is_judged_as_it_is_said_to_be():
     rows = read_table("mask/judged").set_index(["cell", "seed"])
     policies = read_policies(paths.DATA / "mask/runs.safetensors")
-    assert len(rows) == len(policies) == read_provenance("mask/runs")["runs"]
+    assert len(rows) == len(policies)
     name = next(iter(policies))
     said = rows.loc[cell_of(name), int(name.rpartition("_")[2])]
     (judged,) = laboratory.ask_by_stage(policies[name], episodes=5, seed=1)
