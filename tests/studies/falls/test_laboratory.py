@@ -19,20 +19,6 @@ from unload.agent.training import Training
 from unload.network.peq import PEQNetwork
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "cell",
-    ["ranks", "averaged_y", "perfect_successes", "level_taught_0.4", "dug_to_y"],
-)
-def test_a_published_run_is_trained_and_measured_again(cell):
-    """The first one that falls, and runs with most of the changes on the way."""
-    published = read_table("falls/laboratory").set_index(["cell", "seed"])
-    seed = cells.SEEDS[0]
-    expected = published.loc[cell, seed].to_dict()
-    row = laboratory.run_cell(cell, cells.CELLS[cell], seed)["row"]
-    assert {key: row[key] for key in expected} == pytest.approx(expected, rel=1e-3)
-
-
 def test_cells_are_trained_measured_and_written(own_data, monkeypatch, set_in):
     """Runs of one episode, of which a trace has two points."""
     monkeypatch.setitem(measures.LOADS, "episodes", 2)
