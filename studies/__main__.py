@@ -8,9 +8,7 @@ from studies.falls import laboratory, long
 from studies.grid import Grid, train_grid
 from studies.heap import greed, table
 from studies.lifts import agreement, certain, engines, lift_table
-from studies.mask import laboratory as mask_laboratory
-from studies.mask import training as mask
-from studies.mask.cells import MASK
+from studies.mask import laboratory as mask
 from studies.order import laboratory as order_laboratory
 from studies.order import training as order
 from studies.paper import training, tuning, visible_items
@@ -86,12 +84,12 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
         "the index that sorting returns, in place of the rank", order.order_data,
         some(order.ORDER),
     ),
-    "mask": ("parts of an episode to learn from", mask.mask_data, some(MASK)),
+    "mask": ("parts of an episode to learn from", mask.mask_data, some(mask.MASK)),
     "order_laboratory": (
         "the index that sorting returns: the laboratory", order_laboratory.laboratory_data, JOBS
     ),
     "mask_laboratory": (
-        "parts of an episode to learn from: the laboratory", mask_laboratory.laboratory_data, JOBS
+        "parts of an episode to learn from: the laboratory", mask.laboratory_data, JOBS
     ),
     "heap": ("heaps, of which a rake picks several boxes at once", table.heap_data, JOBS),
     "greed": ("heaps pick by pick", greed.greed_data, JOBS),

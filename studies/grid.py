@@ -160,7 +160,7 @@ def _published(grid: Grid, fingerprint: str) -> dict[str, tuple[Greedy | None, p
         return {}
     if record.get("digest") not in (None, files.digest(path)):
         raise ValueError(f"{path} is not the table of its provenance; expected both from one run")
-    policies = read_policies(_policies_file(grid)) if grid.policies else {}
+    policies = policies_of(grid) if grid.policies else {}
     same = {
         name
         for name, settings in _settings(grid).items()
@@ -275,20 +275,30 @@ def write_policies(path: str | Path, policies: Mapping[str, Greedy]) -> None:
     write_weights(path, "policies", settings, tensors)
 
 
+def policies_of(grid: Grid) -> dict[str, Greedy]:
+    """The published policies of a grid, by the names of their runs."""
+    return read_policies(_policies_file(grid))
+
+
 def ask_policies(
-    grid: Grid, name: str, ask: Callable[..., list[dict]], settings: dict, n_jobs: int = -1
+    policies: Mapping[str, Greedy],
+    name: str,
+    ask: Callable[..., list[dict]],
+    settings: dict,
+    command: str,
+    n_jobs: int = -1,
 ) -> None:
-    """Write ``data/<name>.csv``: what the published policies of a grid do in fresh containers.
+    """Write ``data/<name>.csv``: what policies do in fresh containers.
 
     Args:
-        grid: of the policies.
+        policies: by the names of their runs.
         name: of the table, with its folder in ``data/``.
         ask: is called with a policy and ``settings``, and returns rows; each gets its ``cell``
             and ``seed``.
         settings: of the containers.
+        command: what asks them again.
         n_jobs: processes.
     """
-    policies = read_policies(_policies_file(grid))
     # The weights are part of the question: a policy that was trained again is asked again.
     asked = [
         ({"name": run, "weights": code_of(policy.network)} | settings, (policy, settings))
@@ -299,7 +309,7 @@ def ask_policies(
         named = {"cell": cell_of(run), "seed": int(run.rpartition("_")[2])}
         rows += [named | row for row in result.value]
     tables = {name.rpartition("/")[2]: pd.DataFrame(rows)}
-    publish(name, tables, grid.command, settings, results, training_fingerprint())
+    publish(name, tables, command, settings, results, training_fingerprint())
 
 
 def _ask(ask: Callable[..., list[dict]], policy: Greedy, settings: dict) -> list[dict]:

@@ -54,6 +54,12 @@ def rng() -> np.random.Generator:
 
 
 @pytest.fixture
+def items(rng) -> Callable[..., torch.Tensor]:
+    """``items(batch, count)``: random observations."""
+    return lambda *shape: torch.from_numpy(rng.uniform(-1, 1, (*shape, 3)).astype(np.float32))
+
+
+@pytest.fixture
 def run_python() -> Callable[..., tuple[str, str]]:
     """``run_python(code, folder, *options, **environ)``: what a new process prints and says."""
 

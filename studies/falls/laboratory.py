@@ -18,7 +18,7 @@ from studies.falls import measures
 from studies.falls.cells import CELLS, CONFIG, FRESH, SEEN, Change
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell
-from studies.results import COMMAND, Result, code_of, keep_all, publish
+from studies.results import COMMAND, Result, code_of, keep_all, publish, write_table
 from studies.statistics import end_msr
 from studies.sweep import one_thread
 from unload.agent.config import TrainConfig
@@ -145,7 +145,9 @@ def laboratory_data(n_jobs: int = -1) -> None:
     results = keep_cells("laboratory", CELLS, n_jobs)
     trace = pd.DataFrame([point for result in results for point in result.value["trace"]])
     trace = trace[["cell", "seed", *TRACE]].astype({"picks": int})
-    publish_cells("falls/laboratory", "laboratory", COLUMNS, results, trace=trace)
+    write_table("falls/trace", trace, "%.4g")
+    rows = pd.DataFrame([result.value["row"] for result in results])[COLUMNS]
+    publish_cells("falls/laboratory", "laboratory", rows, results)
 
 
 def fresh_data(n_jobs: int = -1) -> None:
@@ -154,17 +156,27 @@ def fresh_data(n_jobs: int = -1) -> None:
     Its columns are those of ``falls/laboratory.csv`` but for ``mean``, and ``judged_averaged_x``:
     the MSR in fresh containers if equal x share one rank when the trained network chooses.
     """
-    publish_cells("falls/fresh", "fresh", FRESH_COLUMNS, keep_cells("fresh", FRESH, n_jobs))
+    results = keep_cells("fresh", FRESH, n_jobs)
+    rows = pd.DataFrame([result.value["row"] for result in results])[FRESH_COLUMNS]
+    publish_cells("falls/fresh", "fresh", rows, results)
 
 
 def publish_cells(
-    name: str, part: str, columns: list[str], results: list[Result], **more: pd.DataFrame
+    name: str,
+    part: str,
+    rows: pd.DataFrame,
+    results: list[Result],
+    config: TrainConfig = CONFIG,
+    float_format: str = "%.4g",
+    **settings: int,
 ) -> None:
-    """Write columns of the rows of ``run_cell``, which a part makes, and perhaps more tables."""
-    table = pd.DataFrame([result.value["row"] for result in results])[columns]
-    settings, fingerprint = {"config": CONFIG.plain(), "runs": len(table)}, training_fingerprint()
-    tables = {name.rpartition("/")[2]: table} | more
-    publish(name, tables, f"{COMMAND} {part}", settings, results, fingerprint, "%.4g")
+    """Write rows of a laboratory's runs, which a part makes of ``results``, and their provenance.
+
+    Its settings are the configuration that the cells change, and what else the rows depend on.
+    """
+    settings = {"config": config.plain(), "runs": len(rows), **settings}
+    tables, command = {name.rpartition("/")[2]: rows}, f"{COMMAND} {part}"
+    publish(name, tables, command, settings, results, training_fingerprint(), float_format)
 
 
 def preferences(table: pd.DataFrame) -> pd.DataFrame:

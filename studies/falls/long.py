@@ -13,13 +13,13 @@ from functools import partial
 import pandas as pd
 import torch
 
-from studies import changes, paths
+from studies import changes
 from studies.falls import measures
 from studies.falls.laboratory import POINT, point, train_in_laboratory
 from studies.fingerprint import training_fingerprint
-from studies.grid import Grid, cell, cell_of, read_policies, train_grid
+from studies.grid import Grid, ask_policies, cell, policies_of, train_grid
 from studies.paper.training import PAPER
-from studies.results import COMMAND, code_of, keep_all, publish
+from studies.results import COMMAND, keep_all, publish
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy
 from unload.network.peq import PEQNetwork
@@ -47,7 +47,6 @@ LONG = Grid(
 )
 LOADS = {"episodes": 100, "seed": 1000}  # that policies are judged in, 500 picks each
 UNTRAINED = 36  # networks, as many as there are runs in the paper's four cells
-COLUMNS = ["cell", "seed", *(f"judged_{name}" for name in measures.BLANKED)]
 
 
 def falls_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
@@ -90,19 +89,8 @@ def published_data(n_jobs: int = -1) -> None:
     A row per policy: its cell and seed; its MSR as it is and with x, y or both set to 0, with the
     mask on. The cell ``untrained`` holds networks as they are drawn.
     """
-    fingerprint = training_fingerprint()
-    configs = {name: cell.config for grid in (PAPER, LONG) for name, cell in grid.cells.items()}
-    configs["untrained"] = configs["paper_mask"]
-
-    # The weights are part of the question: a policy that was trained again is judged again.
-    asked = []
-    for name, policy in published_networks((PAPER, LONG)).items():
-        config, network = replace(configs[cell_of(name)], mask=True), policy.network
-        question = {"name": name, "weights": code_of(network), **config.plain(), **LOADS}
-        asked.append((question, (name, config, network)))
-    results = keep_all("published", _judge, asked, n_jobs)
-    tables = {"published": pd.DataFrame([result.value for result in results])[COLUMNS]}
-    publish("falls/published", tables, f"{COMMAND} falls", LOADS, results, fingerprint)
+    policies = published_networks((PAPER, LONG))
+    ask_policies(policies, "falls/published", judge, LOADS, LONG.command, n_jobs)
 
 
 def published_networks(grids: Iterable[Grid]) -> dict[str, Greedy]:
@@ -112,16 +100,19 @@ def published_networks(grids: Iterable[Grid]) -> dict[str, Greedy]:
     """
     policies: dict[str, Greedy] = {}
     for grid in grids:
-        policies |= read_policies(paths.DATA / f"{grid.name}.safetensors")
+        policies |= policies_of(grid)
     for seed in range(UNTRAINED):
         network = PEQNetwork(generator=torch.Generator().manual_seed(seed))
         policies[f"untrained/seed_{seed}"] = Greedy(network, equalize=True)
     return policies
 
 
-def _judge(name: str, config: TrainConfig, network: PEQNetwork) -> dict:
-    row = {"cell": cell_of(name), "seed": int(name.rpartition("_")[2])}
-    return row | {
-        f"judged_{name}": measures.judged(network, config, blank, loads=LOADS)
-        for name, blank in measures.BLANKED.items()
-    }
+def judge(policy: Greedy, **loads: int) -> list[dict]:
+    """One row of what ``measures.judged`` says of a policy as it is, and of it without place."""
+    config = TrainConfig(equalize=policy.equalize, ties=policy.ties, mask=True)
+    return [
+        {
+            f"judged_{name}": measures.judged(policy.network, config, blank, loads=loads)
+            for name, blank in measures.BLANKED.items()
+        }
+    ]

@@ -44,7 +44,6 @@ RULE_COLUMNS = ["rule", "heaps", "boxes", "falls"]
 MEASURES = "boxes", "falls", "net"
 ENDS = "", "_low", "_high"  # of a mean and its interval
 LINES = {REFERENCE: COLOURS["highest"], LEARNED: "C0", ORACLE: "0.2"}
-# Where the names of rules stand that lie close together: offset in points, and alignment.
 UNITS = {"boxes": "boxes a pick", "falls": "falls a pick", "net": "boxes − λ falls a pick"}
 
 

@@ -12,7 +12,6 @@ of a policy, ``studies.policies.comparison`` tells.
 """
 
 from functools import partial
-from hashlib import blake2b
 
 import numpy as np
 import pandas as pd
@@ -20,7 +19,7 @@ import pandas as pd
 from studies.lifts.lift_table import mixed
 from studies.policies.comparison import SIMPLE
 from studies.policies.margin import containers
-from studies.results import COMMAND, keep_all, measured, publish
+from studies.results import COMMAND, code_of, keep_all, measured, publish
 from studies.statistics import share_interval
 from unload import task
 from unload.load.boxes import Load
@@ -199,7 +198,7 @@ def fresh_lift(
     items = np.flatnonzero(present & near)
     fields = load.positions, load.sizes, load.packages, load.walls
     left, box = Load(*(field[items] for field in fields)), int(np.searchsorted(items, item))
-    boxes = blake2b(left.positions.tobytes() + left.sizes.tobytes(), digest_size=16).hexdigest()
+    boxes = code_of((left.positions, left.sizes))
     return {"settings": SETTINGS, "boxes": boxes, "item": box}, (left, box)
 
 

@@ -1,11 +1,12 @@
-"""The laboratory's answer to why the mask does harm in training.
+"""Why the mask does harm in training: the laboratory, and runs of the paper's length.
 
+    python -m studies mask
     python -m studies mask_laboratory
 
-``data/mask/PLAN.md`` says what was expected of its cells.
+``data/mask/PLAN.md`` says what was expected of their cells.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -16,21 +17,18 @@ from torch import nn
 
 from studies import changes
 from studies.falls import measures
-from studies.falls.cells import B256, SHORT, Change
-from studies.falls.laboratory import SLOPES, keep_cells, train_in_laboratory
-from studies.fingerprint import training_fingerprint
-from studies.grid import Cell, cell
-from studies.mask.cells import EARLY, LATE, learn_from, out_of_step
-from studies.results import COMMAND, publish
+from studies.falls.cells import B256, ENDINGS, SHORT, Change
+from studies.falls.laboratory import SLOPES, keep_cells, publish_cells, train_in_laboratory
+from studies.falls.long import LOADS
+from studies.grid import Cell, ask_policies, cell, policies_of, train_grid
+from studies.mask.cells import EARLY, LATE, MASK, learn_from, out_of_step
 from studies.statistics import end_msr
 from unload import task
-from unload.agent.greedy import greedy_actions
+from unload.agent.greedy import Greedy, greedy_actions
 from unload.agent.training import Training
 
 SEEDS = range(9500, 9520)
-MASKS = {"": True, "_no_mask": False}  # how a cell's name ends
 STAGES = {"msr_25": (0, 25), "msr_100": (25, 100), "msr_500": (100, 500)}  # picks of an episode
-FEW_LOADS = {"episodes": 16, "seed": 1000}  # fresh containers
 LEARNED: dict[str, tuple[Change, Mapping[str, int]]] = {
     "all": (None, {}),
     "early": (EARLY, {}),
@@ -43,7 +41,7 @@ DUG = partial(changes.dug, preference=0.0)
 CELLS: dict[str, Cell] = {
     **{
         f"{name}{ending}": cell(B256, SEEDS, change, mask=mask, **fields)
-        for ending, mask in MASKS.items()
+        for ending, mask in ENDINGS.items()
         for name, (change, fields) in LEARNED.items()
     },
     # Early picks are few, so that the memory drops none of them, not even the first random ones.
@@ -88,7 +86,7 @@ def run_cell(name: str, planned: Cell, seed: int) -> dict:
 
     run = train_in_laboratory(replace(planned.config, seed=seed), planned.change, note)
     row = {"cell": name, "seed": seed, "end": end_msr(run.curve.table())}
-    row |= by_stage(run.agent.network, **FEW_LOADS)
+    row |= by_stage(run.agent.network, **measures.LOADS)
     return row | dict(zip(SLOPES, map(float, slopes[-1])))
 
 
@@ -100,7 +98,19 @@ def laboratory_data(n_jobs: int = -1) -> None:
     """
     results = keep_cells("mask/laboratory", CELLS, n_jobs, run_cell)
     rows = pd.DataFrame([result.value for result in results])
-    settings = {"config": B256.plain(), "runs": len(rows)} | FEW_LOADS
-    fingerprint, command = training_fingerprint(), f"{COMMAND} mask_laboratory"
-    tables = {"laboratory": rows}
-    publish("mask/laboratory", tables, command, settings, results, fingerprint, "%.5g")
+    place, part = "mask/laboratory", "mask_laboratory"
+    publish_cells(place, part, rows, results, B256, "%.5g", **measures.LOADS)
+
+
+def mask_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
+    """Train the grid, see ``train_grid``, and judge all published networks.
+
+    ``mask/judged.csv`` has a row per network, see ``by_stage``.
+    """
+    train_grid(MASK, cells, n_jobs)
+    ask_policies(policies_of(MASK), "mask/judged", ask_by_stage, LOADS, MASK.command, n_jobs)
+
+
+def ask_by_stage(policy: Greedy, episodes: int, seed: int) -> list[dict]:
+    """One row of what ``by_stage`` says of a policy's network."""
+    return [by_stage(policy.network, episodes, seed)]

@@ -10,9 +10,8 @@ from studies.grid import Grid, read_grid
 from studies.order.training import ORDER
 from studies.paper.training import PAPER, SMOOTH
 from studies.results import read_table
-from studies.statistics import PAPER_MSR, PAPER_START
 from studies.style import styled
-from studies.ties.criterion import open_course
+from studies.ties.figures import draw_words
 
 BATCH_COLOURS = {2048: "#1d4e79", 256: "#e08214"}
 # The panels of learning curves: title, grid, and the cell of each batch.
@@ -51,21 +50,12 @@ def draw_answer() -> Figure:
             axes.plot([], [], c=BATCH_COLOURS[batch], lw=2.2, label=label)
         axes.set_title(title, loc="left")
         axes.set(xlim=(0, 20), xticks=range(0, 21, 5), xlabel="million picks of training")
-    _draw_paper(panels[0])
+    draw_words(panels[0], lambda msr: 100 * msr, picks=20, label="the paper")
     for axes in panels[:3]:
         axes.legend(loc="lower right", fontsize=8)
     panels[0].set(ylim=(0, 103), ylabel="successful picks (%)")
     _draw_choices(panels[3])
     return figure
-
-
-def _draw_paper(axes: Axes) -> None:
-    """The two numbers of the paper's curve, and what its words leave open between them."""
-    share = np.array([0, 1e-9, 1])
-    low, high = open_course(share)
-    axes.fill_between(20 * share, 100 * low, 100 * high, color="#f5eed6", zorder=0)
-    ends = [100 * PAPER_START, 100 * PAPER_MSR]
-    axes.plot([0, 20], ends, "k*", ms=11, zorder=5, clip_on=False, label="the paper")
 
 
 def _draw_runs(axes: Axes, curves: pd.DataFrame, colour: str) -> int:

@@ -15,8 +15,8 @@ import pandas as pd
 
 from studies import changes
 from studies.falls import measures
-from studies.falls.cells import B256, CONFIG, SHORT, Change, changed
-from studies.falls.laboratory import keep_cells, train_in_laboratory
+from studies.falls.cells import B256, CONFIG, ENDINGS, SHORT, Change, changed
+from studies.falls.laboratory import keep_cells, publish_cells, train_in_laboratory
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell, cell
 from studies.order.index import BY_ROWS, see_index, sorted_index
@@ -30,7 +30,6 @@ from unload.agent.training import Training
 from unload.load.boxes import ABOVE, BELOW, BESIDE
 
 SEEDS, FEW_SEEDS = range(9600, 9610), range(9600, 9603)
-MASKS = {"": True, "_no_mask": False}  # how a cell's name ends
 SEEN: dict[str, Change] = {"rank": None, "index": see_index}
 WEIGHTS = (4.0, 1.0, 0.5, 0.25)  # of z in W; the paper's is 4
 RANDOM = {"epsilon_init": 1.0, "epsilon_final": 1.0}
@@ -102,7 +101,7 @@ CELLS: dict[str, Cell] = {
             changed(weighted(weight), SEEN[seen]),
             mask=mask,
         )
-        for weight, seen, (ending, mask) in product(WEIGHTS, SEEN, MASKS.items())
+        for weight, seen, (ending, mask) in product(WEIGHTS, SEEN, ENDINGS.items())
     },
     **{
         f"index_by_{rows}_weight_{weight:g}{ending}": cell(
@@ -112,7 +111,7 @@ CELLS: dict[str, Cell] = {
             mask=mask,
         )
         for rows, weight, (ending, mask) in product(
-            ("height", "wall", "random"), WEIGHTS, MASKS.items()
+            ("height", "wall", "random"), WEIGHTS, ENDINGS.items()
         )
     },
     # The ceiling: what random picks teach, in which no choice acts on what is learned from.
@@ -217,19 +216,19 @@ def laboratory_data(n_jobs: int = -1) -> None:
     ``judged``, in 16 fresh containers with the mask. The second has ``run_summary`` of each run of
     the tuning, the third what ``what_index_says``.
     """
-    fingerprint, command = training_fingerprint(), f"{COMMAND} order_laboratory"
+    part = "order_laboratory"
     for name, cells, compute, config in (
         ("laboratory", CELLS, run_cell, B256),
         ("tuning", TUNED, tune, tuning.CONFIG),
     ):
         results = keep_cells(f"order/{name}", cells, n_jobs, compute)
         rows = pd.DataFrame([result.value for result in results])
-        settings = {"config": config.plain(), "runs": len(rows)}
-        publish(f"order/{name}", {name: rows}, command, settings, results, fingerprint, "%.5g")
+        publish_cells(f"order/{name}", part, rows, results, config, "%.5g")
     asked = [
         ({"weight": each, "seed": seed}, (each, seed)) for each, seed in product(WEIGHTS, (0, 1))
     ]
     results = keep_all("order/rows", what_index_says, asked, n_jobs)
     rows = pd.DataFrame([result.value for result in results])
     settings = {"weights": WEIGHTS, "seeds": [0, 1]}
-    publish("order/rows", {"rows": rows}, command, settings, results, fingerprint, "%.5g")
+    tables, command, fingerprint = {"rows": rows}, f"{COMMAND} {part}", training_fingerprint()
+    publish("order/rows", tables, command, settings, results, fingerprint, "%.5g")

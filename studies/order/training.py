@@ -7,11 +7,12 @@
 
 from collections.abc import Sequence
 
-from studies.grid import Grid, ask_policies, cell, train_grid
+from studies.falls.long import LOADS
+from studies.grid import Grid, ask_policies, cell, policies_of, train_grid
 from studies.order.index import see_index, sorted_index
 from studies.paper.training import B2048, CONFIG
 from studies.results import COMMAND
-from studies.ties.choice import LOADS, WAYS, evaluate_choice
+from studies.ties.choice import WAYS, evaluate_choice
 from unload.agent.greedy import Greedy
 
 SEEDS, FEW_SEEDS = range(70, 76), range(70, 73)
@@ -36,7 +37,7 @@ def order_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
     ``order/choice.csv`` has a row per network and way to ask it, see ``ask_index``.
     """
     train_grid(ORDER, cells, n_jobs)
-    ask_policies(ORDER, "order/choice", ask_index, LOADS, n_jobs)
+    ask_policies(policies_of(ORDER), "order/choice", ask_index, LOADS, ORDER.command, n_jobs)
 
 
 def ask_index(policy: Greedy, episodes: int, seed: int) -> list[dict]:

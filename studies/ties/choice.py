@@ -15,16 +15,22 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
-import torch
 
 from studies.changes import repeated, without
+from studies.falls import measures
 from studies.falls.cells import B256, CONFIG
-from studies.falls.laboratory import SLOPES, TILTS, keep_cells, point, train_in_laboratory
-from studies.falls.long import LONG, published_networks
-from studies.fingerprint import training_fingerprint
-from studies.grid import Cell, cell, cell_of
+from studies.falls.laboratory import (
+    SLOPES,
+    TILTS,
+    keep_cells,
+    point,
+    publish_cells,
+    train_in_laboratory,
+)
+from studies.falls.long import LOADS, LONG, published_networks
+from studies.grid import Cell, ask_policies, cell
 from studies.paper.training import PAPER
-from studies.results import COMMAND, code_of, keep_all, publish
+from studies.results import COMMAND
 from studies.statistics import end_msr
 from studies.ties.noise import SPREAD, drifting
 from studies.ties.training import TIES
@@ -38,8 +44,6 @@ from unload.env.vector import ContainerVectorEnv
 
 NOISE = ("frozen", "anew")  # for a load, or at each pick
 WAYS = list(product(NOISE, (False, True)))  # noise and mask
-LOADS = {"episodes": 100, "seed": 1000}  # containers that published networks choose in
-FEW_LOADS = LOADS | {"episodes": 16}  # and those of the laboratory
 CHOICE_SEEDS, MASK_SEEDS = range(7000, 7020), range(8000, 8020)
 COUNTS = ["msr", "failures", "deadlocked", "preference"]
 
@@ -110,13 +114,6 @@ def networks() -> dict[str, Greedy]:
     """All published networks that were trained without jams, and some that were not trained."""
     every = published_networks((PAPER, LONG, TIES))
     return {name: policy for name, policy in every.items() if "jams" not in name}
-
-
-def ask_network(name: str, policy: Greedy) -> list[dict]:
-    """Rows of ``ties/choice.csv``: a network, with noise, mask and place in all ways."""
-    torch.set_num_threads(1)
-    named = {"cell": cell_of(name), "seed": int(name.rpartition("_")[2])}
-    return [named | row for row in ask(policy, **LOADS, places=(True, False))]
 
 
 def ask(policy: Greedy, episodes: int, seed: int, places: Sequence[bool] = (True,)) -> list[dict]:
@@ -198,7 +195,7 @@ def run_laboratory(name: str, planned: Cell, seed: int) -> dict:
     run = train_in_laboratory(config, planned.change, lambda run: trace.append(point(run)))
     points, policy = pd.DataFrame(trace), run.policy()
     row = {"cell": name, "seed": seed, "end": end_msr(run.curve.table())}
-    for choices in ask(policy, **FEW_LOADS):
+    for choices in ask(policy, **measures.LOADS):
         row[f"{choices['noise']}_{'mask' if choices['mask'] else 'no_mask'}"] = choices["msr"]
     row |= points[SLOPES].iloc[-1].to_dict() | points[TILTS].mean().to_dict()
     return row | {"tilt": float(points[TILTS].abs().mean().max())}
@@ -206,14 +203,8 @@ def run_laboratory(name: str, planned: Cell, seed: int) -> dict:
 
 def choice_data(n_jobs: int = -1) -> None:
     """Write ``ties/choice.csv``: a row per network and way to ask it, see ``evaluate_choice``."""
-    questions = [
-        ({"name": name, "weights": code_of(policy.network)} | LOADS, (name, policy))
-        for name, policy in networks().items()
-    ]
-    results = keep_all("ties/choice", ask_network, questions, n_jobs)
-    tables = {"choice": pd.DataFrame([row for result in results for row in result.value])}
-    command, fingerprint = f"{COMMAND} choice", training_fingerprint()
-    publish("ties/choice", tables, command, LOADS, results, fingerprint)
+    in_all_ways = partial(ask, places=(True, False))
+    ask_policies(networks(), "ties/choice", in_all_ways, LOADS, f"{COMMAND} choice", n_jobs)
 
 
 def choice_laboratory_data(n_jobs: int = -1) -> None:
@@ -224,13 +215,11 @@ def choice_laboratory_data(n_jobs: int = -1) -> None:
     tilt of the containers, too: ``tilt_x`` and ``tilt_y``, means over the training, and ``tilt``,
     the larger one of the mean sizes of both.
     """
-    fingerprint = training_fingerprint()
     for name, cells in {"choice_laboratory": CHOICE_CELLS, "mask_laboratory": MASK_CELLS}.items():
         results = keep_cells(f"ties/{name}", cells, n_jobs, run_laboratory)
         rows = pd.DataFrame([result.value for result in results])
         if name == "choice_laboratory":  # its environments show ties in the items' order
             rows = rows.drop(columns=[*TILTS, "tilt"])
         config = next(iter(cells.values())).config
-        settings = {"config": config.plain(), "runs": len(rows)} | FEW_LOADS
-        command = f"{COMMAND} choice_laboratory"
-        publish(f"ties/{name}", {name: rows}, command, settings, results, fingerprint, "%.5g")
+        place, part = f"ties/{name}", "choice_laboratory"
+        publish_cells(place, part, rows, results, config, "%.5g", **measures.LOADS)

@@ -102,18 +102,22 @@ def draw_ends(runs: pd.DataFrame) -> Figure:
     return figure
 
 
-def draw_words(axes: Axes, scale: Callable = lambda msr: msr) -> None:
+def draw_words(
+    axes: Axes, scale: Callable = lambda msr: msr, picks: float = PICKS, label: str | None = None
+) -> None:
     """Draw what the paper says of its Fig. 12: its two numbers, and what its words leave open.
 
     Args:
         axes: over picks.
         scale: of an MSR.
+        picks: of a run, in the unit of the axis.
+        label: of the numbers.
     """
     share = np.array([0, 1e-9, 1])
     low, high = map(scale, open_course(share))
-    axes.fill_between(PICKS * share, low, high, color="#f5eed6", zorder=0)
+    axes.fill_between(picks * share, low, high, color="#f5eed6", zorder=0)
     ends = scale(np.array([PAPER_START, PAPER_MSR]))
-    axes.plot([0, PICKS], ends, "k*", markersize=11, clip_on=False, zorder=4)
+    axes.plot([0, picks], ends, "k*", markersize=11, clip_on=False, zorder=4, label=label)
 
 
 def read_by_duration() -> pd.DataFrame:

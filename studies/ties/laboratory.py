@@ -9,6 +9,8 @@
 from dataclasses import replace
 from functools import partial
 
+import pandas as pd
+
 from studies.falls.cells import CONFIG
 from studies.falls.laboratory import keep_cells, publish_cells
 from studies.grid import cell
@@ -44,4 +46,5 @@ def laboratory_data(n_jobs: int = -1) -> None:
     It has ``cell`` and ``seed``, and the MSR over the last tenth (``end``).
     """
     results = keep_cells("ties/laboratory", CELLS, n_jobs)
-    publish_cells("ties/laboratory", "ties_laboratory", ["cell", "seed", "end"], results)
+    rows = pd.DataFrame([result.value["row"] for result in results])[["cell", "seed", "end"]]
+    publish_cells("ties/laboratory", "ties_laboratory", rows, results)

@@ -5,15 +5,10 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from tests.env.comparing import CONTAINER, assert_same, mixed_stack, play_both
+from tests.env.comparing import assert_same
 from unload.env.vector import ContainerVectorEnv
 from unload.fast import containers
 from unload.physics.table import LiftTable, TablePhysics
-
-
-@pytest.mark.parametrize("settings", [{}, {"equalize": True, "ties": "average"}], ids=str)
-def test_containers_are_emptied_as_on_the_page(settings):
-    play_both(CONTAINER, 3, 200, max_picks=150, stack=mixed_stack, **settings)
 
 
 def test_a_box_that_moves_by_exactly_the_threshold_is_unloaded():

@@ -3,8 +3,6 @@
 What holds for every ``kind`` is tested of those of the studies, too.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 import torch
@@ -17,12 +15,6 @@ from unload.network.factory import make_network
 @pytest.fixture
 def kind() -> type:
     return PEQNetwork
-
-
-@pytest.fixture
-def items(rng) -> Callable[..., torch.Tensor]:
-    """``items(batch, count)``: random observations."""
-    return lambda *shape: torch.from_numpy(rng.uniform(-1, 1, (*shape, 3)).astype(np.float32))
 
 
 def make(kind: type, n_features: int = 16, seed: int = 0) -> torch.nn.Module:

@@ -15,68 +15,11 @@ from unload.agent.training import Training
 SMALL = replace(CONFIG, picks=6400, replay_size=2**13, log_interval=10, seed=3)
 
 
-def run_of(change, steps=3, config=SMALL):
-    """A run with a change, and the observations that it has seen, as stored rows."""
-    run = Training(config, change=change)
-    seen = []
-    for _ in range(steps):
-        seen.append(run.rollout.observations.copy())
-        run.step()
-    return run, np.concatenate(seen)
-
-
-@pytest.fixture
-def asking():
-    """A run, and the observations of its greedy choices, which all become that of item 0."""
-    run, asked = Training(SMALL), []
-    run.agent.learner.best_actions = lambda observations, allowed: (
-        asked.append(observations) or np.zeros(len(allowed), np.int64)
-    )
-    return run, asked
-
-
-def remembered(run):
-    """The observations in a run's replay memory."""
-    return run.replay.arrays["observations"][: len(run.replay)].copy()
-
-
-def test_height_reward_shapes_what_is_learned_and_not_what_is_seen():
-    plain, seen = run_of(None, steps=1)
-    shaped, _ = run_of(partial(changes.height_reward, share=0.4), steps=1)
-    rewards, learned = (run.replay.arrays["rewards"][:64] for run in (plain, shaped))
-    heights = seen[np.arange(64), plain.replay.arrays["actions"][:64], 2]
-    expected = rewards + 0.4 * (heights + 1) / 2 * (rewards < 0)
-    np.testing.assert_allclose(learned, expected, rtol=1e-6)
-    assert (rewards < 0).any() and (rewards > 0).any()
-    assert plain.curve.sums == shaped.curve.sums
-
-
-def test_only_what_is_stored_is_changed():
-    run, seen = run_of(changes.shuffled)
-    plain, same = run_of(None)
-    stored = remembered(run)
-    assert (seen == same).all()  # exploring alone: the choices do not depend on the weights
-    assert (stored[..., 2] == seen[..., 2]).all()
-    assert (stored[..., :2] != seen[..., :2]).mean() > 0.9
-    assert (remembered(plain) == seen).all()
-    signs = remembered(run_of(changes.mirrored)[0]) / seen
-    assert (signs == signs[:, :1]).all() and (signs[:, 0, 2] == 1).all()
-    assert len(np.unique(signs[:, 0, :2], axis=0)) == 4, "of x and y, each with its own sign"
-
-
-def test_what_is_seen_is_changed_in_choosing_and_learning(asking):
-    run, asked = asking
-    changes.see(run, changes.without)
-    run.step()
-    run.agent.choose(run.rollout.observations, run.rollout.allowed, 0.0, run.rng)
-    assert (asked[-1][..., :2] == 0).all()
-    assert (asked[-1][..., 2] == run.rollout.observations[..., 2]).all()
-    assert (remembered(run)[..., :2] == 0).all()
-
-
 def test_failures_are_replaced_by_successes_of_the_same_step():
     """Where all of a step failed, what was stored last is stored again."""
-    run, _ = run_of(partial(changes.successes_only, start=128), steps=4)
+    run = Training(SMALL, change=partial(changes.successes_only, start=128))
+    for _ in range(4):
+        run.step()
     arrays = run.replay.arrays
     rewards = arrays["rewards"][:256]
     assert (rewards[:128] < 0).any()
@@ -94,8 +37,11 @@ def test_failures_are_replaced_by_successes_of_the_same_step():
 
 
 @pytest.mark.parametrize(("given", "axes"), [({"axes": (1,)}, [1]), ({}, [0, 1])])
-def test_choices_see_other_signs_than_the_memory_holds(asking, given, axes):
-    run, asked = asking
+def test_choices_see_other_signs_than_the_memory_holds(given, axes):
+    run, asked = Training(SMALL), []
+    run.agent.learner.best_actions = lambda observations, allowed: (
+        asked.append(observations) or np.zeros(len(allowed), np.int64)
+    )
     changes.untilted(run, **given)
     seen = run.rollout.observations.copy()
     run.agent.choose(seen, run.rollout.allowed, 0.0, run.rng)
@@ -103,7 +49,7 @@ def test_choices_see_other_signs_than_the_memory_holds(asking, given, axes):
     signs = asked[0] / seen
     assert set(np.unique(signs)) == {-1, 1} and (signs == signs[:, :1]).all()
     assert np.flatnonzero((signs[:, 0] < 0).any(axis=0)).tolist() == axes
-    assert (remembered(run) == seen).all()
+    assert (run.replay.arrays["observations"][: len(run.replay)] == seen).all()
 
 
 @pytest.mark.slow

@@ -1,6 +1,5 @@
 """Networks more expressive than the paper's; what holds for that one holds for them, too."""
 
-import numpy as np
 import pytest
 import torch
 
@@ -19,12 +18,6 @@ from tests.network.test_peq import (  # noqa: F401
 @pytest.fixture(params=NETWORKS.values())
 def kind(request) -> type:
     return request.param
-
-
-@pytest.fixture
-def items(rng):
-    """``items(batch, count)``: random observations."""
-    return lambda *shape: torch.from_numpy(rng.uniform(-1, 1, (*shape, 3)).astype(np.float32))
 
 
 def test_the_two_layer_scorer_is_the_papers_network_with_a_hidden_layer(items):

@@ -49,24 +49,11 @@ def test_what_falls_and_what_is_like_the_papers_figures(judge, run, found):
     assert judge(run) is found
 
 
-def test_the_end_is_the_last_tenth_of_the_picks():
-    assert statistics.end_msr(course([0.0] * 18 + [1.0, 1.0], 0.1)) == 1
-
-
 @pytest.mark.parametrize(("sinks", "found"), [(0.12, True), (0.18, False)])
 def test_a_loss_rises_for_good_if_it_sinks_by_less_than_half_of_it(sinks, found):
     """From 0.2 to 0.5."""
     loss = np.r_[0.3, 0.2, np.linspace(0.2, 0.5, 10), np.full(8, 0.5 - sinks)]
     assert statistics.loss_rises_for_good(course([0.5] * 20, loss)) is found
-
-
-def test_a_cell_has_the_means_of_its_runs_or_how_many_there_are():
-    runs = pd.DataFrame({"cell": [*"aab"], "seed": [0, 1, 0], "end": [0.5, 0.7, 0.6]})
-    found = statistics.by_cell(runs.assign(fell=[True, True, False], start=[0.2, 0.4, 0.3]))
-    low, high = statistics.t_interval([0.5, 0.7])
-    first = {"runs": 2, "end": 0.6, "low": low, "high": high, "lowest": 0.5, "highest": 0.7}
-    assert found.loc["a"].to_dict() == pytest.approx(first | {"fell": 2, "start": 0.3})
-    assert found.loc["b", ["runs", "fell", "start"]].tolist() == [1, 0, 0.3]
 
 
 def test_two_values_have_an_interval_and_one_has_none():
@@ -93,11 +80,3 @@ def test_pairs_make_the_interval_of_a_ratio_narrow():
     assert np.isnan(statistics.ratio_interval(reference, -reference)).all()
     assert np.array_equal(statistics.mean_interval([0.7]), [0.7, np.nan, np.nan], equal_nan=True)
     assert np.isnan(statistics.ratio_interval(reference, np.array([-9.0, 9, 2, 0]))).all()
-
-
-def test_what_a_plan_predicts_is_read_from_its_tables():
-    predicted = statistics.predictions("ties")
-    counts = {"N": 9, "P": 2, "Q": 8, "M": 5}
-    names = [f"{part}{number}" for part in counts for number in range(1, counts[part] + 1)]
-    assert list(predicted.index) == names
-    assert predicted["N3"] == "drifting with the mask: at least 3 of 5 fall"

@@ -8,30 +8,15 @@ import pandas as pd
 import pytest
 import torch
 
-from studies import paths
+from studies import grid, paths
 from studies.falls import cells, laboratory, long, measures
 from studies.falls.laboratory import CONFIG
 from studies.grid import read_policies
 from studies.paper.training import PAPER
-from studies.policies.margin import own_scores
 from studies.results import read_provenance, read_table
 from unload import evaluate
 from unload.agent.training import Training
 from unload.network.peq import PEQNetwork
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "cell",
-    ["ranks", "averaged_y", "perfect_successes", "level_taught_0.4", "dug_to_y"],
-)
-def test_a_published_run_is_trained_and_measured_again(cell):
-    """The first one that falls, and runs with most of the changes on the way."""
-    published = read_table("falls/laboratory").set_index(["cell", "seed"])
-    seed = cells.SEEDS[0]
-    expected = published.loc[cell, seed].to_dict()
-    row = laboratory.run_cell(cell, cells.CELLS[cell], seed)["row"]
-    assert {key: row[key] for key in expected} == pytest.approx(expected, rel=1e-3)
 
 
 def test_cells_are_trained_measured_and_written(own_data, monkeypatch, set_in):
@@ -106,9 +91,10 @@ def test_policies_and_networks_are_judged_alike(own_data, set_in):
     """One published policy and one network without training, in one container with the mask."""
     name = "paper_no_mask/seed_0"
     policy = read_policies(paths.ROOT / "data/falls/paper.safetensors")[name]
-    published = {"paper": {name: policy}, "long": {}}
-    set_in(long, read_policies=lambda path: published[path.stem], training_fingerprint=lambda: "f")
-    set_in(long, UNTRAINED=1, LOADS={"episodes": 1, "seed": 0})
+    published = {PAPER.name: {name: policy}, long.LONG.name: {}}
+    set_in(long, policies_of=lambda of: published[of.name], UNTRAINED=1)
+    set_in(long, LOADS={"episodes": 1, "seed": 0})
+    set_in(grid, training_fingerprint=lambda: "f")
     long.published_data(n_jobs=1)
     trained, drawn = read_table("falls/published").itertuples()
     assert (trained.cell, drawn.cell) == ("paper_no_mask", "untrained")
@@ -116,7 +102,7 @@ def test_policies_and_networks_are_judged_alike(own_data, set_in):
     assert trained.judged_as_is == evaluate(policy, 1, 0, mask=True)["success_rate"].mean()
     policy.network.scorer.weight.data[0, 0] += 1  # another network of the same name
     long.published_data(n_jobs=1)
-    assert len([*(own_data / "runs/published").rglob("*.npz")]) == 3
+    assert len([*(own_data / "runs/falls/published").rglob("*.npz")]) == 3
 
 
 def test_the_published_table_holds_every_policy():
@@ -142,15 +128,6 @@ def network():
 @pytest.fixture
 def observations(rng):
     return rng.uniform(-1, 1, (40, 128, 3)).astype(np.float32)
-
-
-def test_slopes_are_those_of_the_scores_of_high_boxes(observations):
-    network = PEQNetwork(16, torch.Generator().manual_seed(0)).double()
-    seen = observations.astype(float)
-    high = seen[seen[..., 2] > np.median(seen[..., 2])]
-    steps = 1e-6 * np.eye(3)
-    rises = [own_scores(network, high + step) - own_scores(network, high - step) for step in steps]
-    assert measures.slopes(network, seen) == pytest.approx(np.mean(rises, axis=1) / 2e-6, abs=1e-6)
 
 
 def test_tilt_is_the_effect_of_place_at_equal_height(observations):

@@ -1,6 +1,5 @@
 """The paper's numbers beside ours, its training, and its search: data, plots and measures."""
 
-from dataclasses import replace
 from shutil import copy
 
 import numpy as np
@@ -12,7 +11,7 @@ from studies.paper import numbers, training, tuning
 from studies.paper.training import PAPER
 from studies.paper.tuning import tuning_grid
 from studies.results import read_table
-from unload import TrainConfig, load_policy, task
+from unload import load_policy, task
 from unload.support import files
 
 
@@ -37,10 +36,6 @@ def test_policies_play_elsewhere_once_their_cell_is_trained(tmp_path, monkeypatc
         for each in (name, tmp_path / f"policies/{name}.safetensors"):  # what ships is the same
             stored = load_policy(each).network.state_dict()
             assert all(stored[key].equal(weights[key]) for key in weights)
-
-
-def test_the_default_cell_has_the_defaults():
-    assert replace(PAPER.cells[training.DEFAULTS].config, seed=0) == TrainConfig()
 
 
 def test_a_search_is_published_as_one_table(own_data, set_in):

@@ -15,12 +15,11 @@ from studies.falls.laboratory import CONFIG
 from studies.grid import read_grid
 from studies.results import read_table
 from studies.seamless import training
-from studies.seamless.jamming import jam, neighbours
+from studies.seamless.jamming import jam
 from studies.seamless.training import CELLS, EXPORTED, FIRST_SEED
 from studies.statistics import seamless_plan
 from unload import task
 from unload.agent.training import Training
-from unload.load.boxes import BESIDE, Load
 
 NAMES = [f"{name}.csv" for name in ("loss_function_agent", "total_rew_function_agent")]
 
@@ -35,27 +34,6 @@ def test_the_jams_of_the_next_episode_are_others():
         run.rollout.steps += run.config.max_picks
     free = np.maximum(*found) >= task.LIFT_THRESHOLD
     assert (found[0] != found[1])[free].mean() == pytest.approx(2 / 3, abs=0.1)
-
-
-def test_neighbours_are_those_that_touch_a_box():
-    run = Training(replace(CONFIG, seed=3, epsilon_final=1.0, mask=False))
-    for _ in range(40):
-        run.step()
-    state, seen = run.rollout.envs.unwrapped._containers, set()
-    for row in range(0, 128, 9):
-        items = state.visible[:, row].astype(np.int64)
-        covered, beside = neighbours(state, items)
-        for env in range(0, 64, 7):
-            count = int(np.flatnonzero(state.present[env])[-1]) + 1
-            boxes = state.geometry[env, :count]
-            walls = np.unique(boxes[:, 0] - boxes[:, 3] / 2, return_inverse=True)[1]
-            load = Load(boxes[:, :3], boxes[:, 3:], np.zeros(count, int), walls)
-            item, present = int(items[env]), state.present[env, :count].astype(bool)
-            touches = present & (load.walls == load.walls[item] + 1)
-            found = load.behind(touches)[item], present[load.contacts.of(BESIDE, item)].sum()
-            assert (covered[env], beside[env]) == found
-            seen.add(found)
-    assert len(seen) >= 6
 
 
 def test_the_cells_are_those_of_the_plan():

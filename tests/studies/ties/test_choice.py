@@ -171,16 +171,6 @@ def test_the_order_of_equals_lasts_as_long_as_it_is_told_to(run, correlation):
         assert found == pytest.approx(correlation**lag, abs=0.06)
 
 
-def test_what_is_chosen_by_is_what_is_learned_from():
-    config = replace(UNBLURRED, epsilon_init=0.0)
-    run = Training(config, change=partial(drifting, correlation=(0.5, 0.5, 0.5)))
-    before = run.rollout.observations.copy()
-    run.step()
-    stored = run.replay.arrays["observations"][:64], run.replay.arrays["actions"][:64]
-    best = run.agent.learner.best_actions(stored[0], np.ones((64, 128), bool))
-    assert (stored[1] == best).all() and (stored[0] != before).any(axis=(1, 2)).all()
-
-
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
 def test_noise_is_renewed_by_a_success_alone(correlation):
     """What is not renewed keeps its offsets, too, from which a drift goes on."""
