@@ -94,13 +94,13 @@ class Surroundings:
         return situation_in(*contacts, self._geometry, self.load.container[1], item)
 
 
-@compiled(lazy=True)
+@compiled
 def key_length(boxes):
     """The greatest number of words in the key of a situation of so many boxes, with two sides."""
     return 5 + 6 * boxes
 
 
-@compiled(lazy=True)
+@compiled
 def find_movers(starts, links, present, item, members, most):
     """How many boxes a lift moves: the item and all on top of it, at most ``most``.
 
@@ -124,7 +124,7 @@ def find_movers(starts, links, present, item, members, most):
     return dynamic
 
 
-@compiled(lazy=True)
+@compiled
 def find_touching(starts, links, present, members, dynamic):
     """How many boxes decide a lift: those that it moves, and what they stand on or may rub against.
 
@@ -146,7 +146,7 @@ def find_touching(starts, links, present, members, dynamic):
     return count
 
 
-@compiled(lazy=True)
+@compiled
 def write_key(geometry, right, members, dynamic, key):
     """Write the words of ``Situation.key``; return how many there are.
 
@@ -207,7 +207,7 @@ def situation_in(
     )
 
 
-@compiled(lazy=True)
+@compiled
 def parts_of_key(key):
     """Where in a situation's key its side walls begin, and where its boxes, see ``Situation.key``.
 
@@ -218,12 +218,12 @@ def parts_of_key(key):
     return sides, sides + (len(key) - sides) % 6
 
 
-@compiled(lazy=True)
+@compiled
 def _micrometres(length):
     return np.int32(np.rint(length / RESOLUTION))
 
 
-@compiled(lazy=True)
+@compiled
 def _holds(members, end, box):
     for i in range(end):
         if members[i] == box:
@@ -231,7 +231,7 @@ def _holds(members, end, box):
     return False
 
 
-@compiled(lazy=True)
+@compiled
 def _insert(members, first, end, box):
     """Put a box into its place among the sorted ``members[first:end]``; the new end."""
     place = end
@@ -242,7 +242,7 @@ def _insert(members, first, end, box):
     return end + 1
 
 
-@compiled(lazy=True)
+@compiled
 def digest_of(words):
     """The digest of a situation's key, (k,) int32: never 0."""
     digest = np.uint64(len(words))

@@ -231,7 +231,7 @@ def _inserted(array: np.ndarray, place: np.integer, value: int | np.integer) -> 
     return np.concatenate((array[:place], array.dtype.type(value)[np.newaxis], array[place:]))
 
 
-@compiled(lazy=True)
+@compiled
 def find_distance(digests, micrometres, digest):
     """The distance of a digest in micrometres, or ``UNKNOWN``."""
     place = np.searchsorted(digests, digest)
@@ -239,7 +239,7 @@ def find_distance(digests, micrometres, digest):
     return micrometres[place] if known else UNKNOWN
 
 
-@compiled(lazy=True)
+@compiled
 def held_by_rule(key):
     """Whether what lies on the chosen box, one box or two, holds it down.
 
@@ -259,7 +259,7 @@ def held_by_rule(key):
     return _presses_within(key, first, MIDDLE, MIDDLE) or _between_others(key, first)
 
 
-@compiled(lazy=True)
+@compiled
 def _presses_within(key, first, along_x, along_y):
     """Whether the boxes on top press on the chosen one so near its centre, on average.
 
@@ -284,7 +284,7 @@ def _presses_within(key, first, along_x, along_y):
     return True
 
 
-@compiled(lazy=True)
+@compiled
 def _bridges(key, first, box, axis):
     """Whether two lie side by side on the chosen box, and this one's far end on another box.
 
@@ -309,7 +309,7 @@ def _bridges(key, first, box, axis):
     return False
 
 
-@compiled(lazy=True)
+@compiled
 def _between_others(key, first):
     """Whether boxes or side walls cover both sides of the chosen box, see ``COVERED``."""
     depth, width, height = key[first + 3], key[first + 4], key[first + 5]
@@ -335,7 +335,7 @@ def _between_others(key, first):
     return min(left, right) >= COVERED
 
 
-@compiled(lazy=True)
+@compiled
 def _shared(centre, length, edge):
     """The share of an edge around 0 that an interval covers; below 0 if it does not."""
     return (min(centre + length / 2, edge / 2) - max(centre - length / 2, -edge / 2)) / edge

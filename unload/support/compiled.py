@@ -53,8 +53,7 @@ class Compiled:
 
     def __call__(self, *given):
         if self._lazy and not Compiled.any_compiled:
-            with np.errstate(over="ignore"):  # integers wrap, as compiled ones do
-                return self._function(*given)
+            return self._function(*given)
         return self.dispatcher(*given)
 
     @cached_property
