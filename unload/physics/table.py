@@ -244,7 +244,7 @@ def held_by_rule(key):
     """Whether what lies on the chosen box, one box or two, holds it down.
 
     In random loads and random stacks of boxes of any proportions, no lift contradicts this
-    (``studies.lifts.certain``); a search beyond these finds two side by side that do.
+    (``data/certain_lifts.csv``); a search beyond these finds two side by side that do.
 
     The pull raises 1.04 boxes besides the chosen one. So one on its middle rises by 9 mm, and off
     it, it tips aside, unless it stands between others; two hold it down even if their other ends
