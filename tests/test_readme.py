@@ -111,8 +111,11 @@ def test_what_came_out_is_what_the_data_say():
     assert f"agents sink to {none.mean():.0f} % ({number})" in text
     early = 100 * read_table("mask/laboratory").groupby("cell")["msr"].mean()
     assert early["early"] > 99
-    long = 100 * read_table("mask/judged").query("cell == 'early'")["msr"]
-    assert f"no cure (two agents: {' and '.join(f'{each:.0f}' for each in long)} %)." in text
+    long = 100 * read_table("mask/judged").set_index("cell")["msr"]
+    said = " and ".join(f"{each:.0f}" for each in long["early"])
+    assert f"helps, but is no cure (two agents: {said} %);" in text
+    short = long[long.index.str.startswith("episodes_100")]
+    assert len(short) == 4 and f"(four agents: {short.min():.0f} to {short.max():.1f} %)." in text
     assert f"random picks (if not: {early['early_short_memory']:.0f} %)." in text
     assert f"only after 100 boxes reach {early['late']:.0f} %." in text
     untrained = read_table("ties/choice").query("cell == 'untrained' and not place")

@@ -70,7 +70,7 @@ class Training:
     Args:
         config: of the run.
         stack: makes the loads, see ``unload.train``.
-        change: is called with the finished ``Training``, see ``train``; nothing if None.
+        change: is called with the ``Training`` once it is set up, see ``train``; nothing if None.
 
     Attributes:
         settings: what the run is, as JSON can hold it.

@@ -108,6 +108,7 @@ def numbered(load: Load, items: np.ndarray) -> bytes:
     """
     first = items[:_NUMBERED]
     colours = np.tile(COLOURS["unseen"], (len(load), 1))
+    # Backwards, so that an item that is named twice has the colour of its first pick.
     colours[first[::-1]] = colormaps["viridis_r"](np.linspace(0.1, 0.9, len(first)))[::-1, :3]
     low, high = corners(load, np.arange(len(load)))
     figure = _drawn(low, high, colours, (_WIDTH, _WIDTH * 0.6), 0.0, load.container)

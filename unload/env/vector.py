@@ -24,9 +24,9 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     Args:
         physics: ``"table"``, which is the fastest, and so the default here, where picks are made by
-            the million; ``"places"``, ``"local"``, or a ``LocalPhysics`` of your own. Of it only
-            ``close`` and ``simulate`` are called, the latter for each pick that does not repeat a
-            failed one; a ``TablePhysics`` is asked only what neither its table nor a rule answers.
+            the million; ``"places"``, ``"local"``, or a ``LocalPhysics`` of your own, whose
+            ``simulate`` is called for each lift of a box that does not repeat a failed one; a
+            ``TablePhysics`` is asked only what neither its table nor a rule answers.
 
     Attributes:
         physics: what lifts.
@@ -108,7 +108,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         state = self._containers
         self._loads[env], self._seen_at[env] = load, positions
         order = observation.nearest(positions[items], len(items), load.container)
-        first = state.unloaded[env]
+        first = state.unloaded[env]  # those taken out count as the first ones, see ``Containers``
         state.by_distance[env, first : first + len(items)] = items[order]
         state.seen[env, : len(load)] = scale(positions, load.container)
         containers.show_nearest(state, env, *self._how_observed)

@@ -82,7 +82,7 @@ def main(arguments: list[str] | None = None) -> None:
         said += f", {order['early'].sum()} before their stop"
     if picture is not None:
         said += f"; the picture is {Path(picture).resolve()}"
-    if sys.stderr is not None:  # closed; print would take the screen, where the order is
+    if sys.stderr is not None:  # None if closed: print would take the screen, where the order is
         print(said, file=sys.stderr)
 
 

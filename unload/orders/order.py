@@ -114,7 +114,8 @@ def _reachable_first(load: Load, stops: np.ndarray | None) -> np.ndarray:
     preferred = np.lexsort(keys if stops is None else [*keys, _due(load, stops)])
     turns = np.argsort(preferred).tolist()
 
-    # How many boxes each one waits for, and which ones it frees: those above, then those in front.
+    # First of what lies above, then of what stands in front: for how many such boxes each one
+    # waits, and which ones it frees, those below it and those behind it.
     waits_for, frees = [], []
     for boxes, others in (load.covers, load.fronts):
         waits_for.append(np.bincount(boxes, minlength=len(load)))

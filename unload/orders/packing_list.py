@@ -125,8 +125,8 @@ def read_load(
             count, most = edits.any(axis=1).sum(), 1000 * np.linalg.norm(edits, axis=1).max()
             LOGGER.warning("%d of %d boxes %s up to %.1f mm", count, len(load), what, most)
     if moves.any() or smaller.any():
-        # Two boxes may overlap by twice their fault, the largest move, and half of what an edge
-        # lost.
+        # In mm; two boxes may overlap by twice the sum of the fault, the largest move and half of
+        # what an edge lost.
         hidden = 2000 * (tolerance + np.abs(moves).max() + smaller.max() / 2)
         LOGGER.warning("An order may overlook overlaps of up to %.0f mm", hidden)
     return load

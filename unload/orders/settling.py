@@ -5,7 +5,7 @@ import numpy as np
 from unload.load.boxes import BELOW, CONTACT_TOLERANCE, OVERLAP, Load
 
 SLACK = 0.0005  # m, at each side of a face: physics makes boxes 1 mm narrower
-Rows = list[tuple[int, np.ndarray]]  # each box, and those that stand right before it
+Rows = list[tuple[int, np.ndarray]]  # each box, and all that stand before it in its row
 
 
 def settle(
@@ -14,7 +14,7 @@ def settle(
     """Move and shrink boxes until they lie on what is below, clear of what is beside, and inside.
 
     Each box may be off by ``tolerance``, two of them by twice that from each other. Two boxes that
-    share more of depth and of width lie one above the other; others stand side by side. A larger
+    share more than that of depth and of width lie one above the other; others stand side by side. A larger
     fault is left as it is: a ``Load`` of such boxes is refused.
 
     Args:
@@ -81,7 +81,8 @@ def _rows(axis: int, low, high, start, end, tolerance: float) -> Rows:
     for place, box in enumerate(order):
         share, settled = _shared(low, high, place), _shared(start, end, place)
         # One stands before the other: apart along this axis, but for the fault of both, and at one
-        # height. Pairs that overlap less along y are pushed apart there, or need not be.
+        # height. Along x, pairs that overlap less along y are left out, because they are pushed
+        # apart there, and so are those clearly apart along y, which need nothing.
         beside = (share[:, axis] <= 2 * tolerance) & (settled[:, 2] > OVERLAP)
         if axis == 0:
             beside &= (share[:, 0] <= share[:, 1]) & (share[:, 1] > -2 * tolerance)

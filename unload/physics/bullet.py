@@ -246,9 +246,10 @@ class World:
             body: which one.
             force: N.
             seconds: how long, rounded to whole time steps.
-            hopeless: is asked whenever ``ASKED_EVERY`` has passed, with how far the body has moved,
-                in m, its speed, in m/s, and the s that are left, whether to give up, which returns
-                0. A pull that goes on ends with the same bits as one that was not asked.
+            hopeless: is called each time ``ASKED_EVERY`` has passed, with how far the body has
+                moved (m), its speed (m/s) and the time that is left (s). If it returns True, the
+                pull is given up, and 0 is returned. A pull that goes on ends with the same bits as
+                one that was not asked.
         """
         start = np.array(self.pose(body)[0])
 

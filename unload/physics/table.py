@@ -147,8 +147,9 @@ class TablePhysics(LocalPhysics):
     Args:
         table: filled by its engine as situations are met. Share one among environments to share
             their experience; one of its own if None.
-        exact: ask for the distance of each lift that the table lacks and that fewer than
-            ``held_down`` boxes lie on: for a table that is kept.
+        exact: simulate to its end each lift that the table lacks, instead of answering by
+            ``held_by_rule`` or giving up early, if fewer than ``held_down`` boxes lie on the chosen
+            one: for a table that is kept.
         held_down: so many boxes on top hold a box down. With 1 the boxes' places alone decide.
     """
 
@@ -244,11 +245,13 @@ def held_by_rule(key):
     """Whether what lies on the chosen box, one box or two, holds it down.
 
     In random loads and random stacks of boxes of any proportions, no lift contradicts this
-    (``data/certain_lifts.csv``); a search beyond these finds two side by side that do.
+    (``data/certain_lifts.csv``); a search beyond these finds cases of two boxes side by side that
+    do.
 
-    The pull raises 1.04 boxes besides the chosen one. So one on its middle rises by 9 mm, and off
-    it, it tips aside, unless it stands between others; two hold it down even if their other ends
-    lie on neighbours, because half of their weight is that of one. See ``MIDDLE`` and ``COVERED``.
+    The pull can raise 1.04 boxes besides the chosen one. So with one box on its middle the chosen
+    one rises by 9 mm only. With one off its middle it tips aside, unless it stands between others.
+    Two boxes hold it down even if neighbours carry their other ends: it then bears half of the
+    weight of each, together that of one box. See ``MIDDLE`` and ``COVERED``.
 
     Args:
         key: the words of a situation's key, see ``Situation.key``.
@@ -298,7 +301,9 @@ def _bridges(key, first, box, axis):
         if abs(key[on + 2] - (key[on + 5] + key[first + 5]) / 2) > NEAR:
             return False
     side = 1 if key[upper + axis] > 0 else -1
-    for lower in range(first + 18, len(key), 6):  # the boxes that cannot move
+    # Of the boxes that cannot move, one must carry the far end: lie right below, under the middle
+    # line, and reach out as far. ``away``: how far outwards its centre lies from that of the bridge.
+    for lower in range(first + 18, len(key), 6):
         away, edge = side * (key[lower + axis] - key[upper + axis]), key[lower + 3 + axis]
         touches = _shared(away, edge, key[upper + 3 + axis]) > 0
         gap = key[upper + 2] - key[lower + 2] - (key[upper + 5] + key[lower + 5]) / 2
