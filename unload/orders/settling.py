@@ -14,8 +14,8 @@ def settle(
     """Move and shrink boxes until they lie on what is below, clear of what is beside, and inside.
 
     Each box may be off by ``tolerance``, two of them by twice that from each other. Two boxes that
-    share more than that of depth and of width lie one above the other; others stand side by side. A larger
-    fault is left as it is: a ``Load`` of such boxes is refused.
+    share more than that of depth and of width lie one above the other; others stand side by side. A
+    larger fault is left as it is: a ``Load`` of such boxes is refused.
 
     Args:
         low, sizes: (n, 3) float64, corners nearest to the origin and edge lengths in m.

@@ -39,8 +39,8 @@ def simulate(
     import mujoco
 
     model = mujoco.MjModel.from_xml_string(_described(situation))
-    # Bullet takes a share of each velocity in each second, whatever the mass. Here damping is a force
-    # by velocity, so it grows with mass and inertia.
+    # Bullet takes a share of each velocity in each second, whatever the mass. Here damping is a
+    # force by velocity, so it grows with mass and inertia.
     inertia = np.hstack([np.repeat(model.body_mass[1:, None], 3, axis=1), model.body_inertia[1:]])
     model.dof_damping[:] = -np.log(1 - DAMPING) * inertia.ravel()
 

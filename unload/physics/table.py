@@ -302,7 +302,8 @@ def _bridges(key, first, box, axis):
             return False
     side = 1 if key[upper + axis] > 0 else -1
     # Of the boxes that cannot move, one must carry the far end: lie right below, under the middle
-    # line, and reach out as far. ``away``: how far outwards its centre lies from that of the bridge.
+    # line, and reach out as far. ``away``: how far outwards its centre lies from that of the
+    # bridge.
     for lower in range(first + 18, len(key), 6):
         away, edge = side * (key[lower + axis] - key[upper + axis]), key[lower + 3 + axis]
         touches = _shared(away, edge, key[upper + 3 + axis]) > 0
