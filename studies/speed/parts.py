@@ -183,7 +183,7 @@ def benchmarks(table: pd.DataFrame) -> Figure:
             axes.text(max(row.ratio, 1) * 1.15, place, text, va="center", fontsize=8)
         axes.set_yticks(range(len(group)), group["how"], fontsize=8)
         axes.set(xscale="log", ylim=(len(group) - 0.4, -0.6))
-        axes.set(xlim=(0.5, 20 * table["ratio"].max()))
+        axes.set(xlim=(0.5 * min(1, table["ratio"].min()), 20 * table["ratio"].max()))
         axes.set_title(what, loc="left", fontsize=9)
         axes.minorticks_off()
         axes.grid(False, axis="y")
