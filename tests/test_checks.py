@@ -139,7 +139,7 @@ def test_runs_that_differ_are_compared_in_a_sentence():
 
 
 MASKED = "np.where(allowed, scores, -np.inf)"
-BEST = "target(after).masked_fill(~free, -torch.inf).amax(dim=1)"
+BEST = "target(after).masked_fill(~allowed_after, -torch.inf).amax(dim=1)"
 ENDED = "best.masked_fill(ended, 0)"
 MEAN = "np.mean([reward for _, _, reward, *_ in picks])"
 MISTAKES = [  # in ``plain``: what is replaced, by what, and what is said
@@ -154,8 +154,8 @@ MISTAKES = [  # in ``plain``: what is replaced, by what, and what is said
         "the count of random numbers drawn is not; expected one an environment",
     ),
     ("update", BEST, "target(after).amax(dim=1)", "the mask is forgotten, and the maximum"),
-    ("update", "~free", "free", "the mask is inverted"),
-    ("update", BEST, "(target(after) * free).amax(dim=1)", "what the mask excludes has the score"),
+    ("update", "~allowed_after", "allowed_after", "the mask is inverted"),
+    ("update", BEST, "(target(after) * allowed_after).amax(dim=1)", "what the mask excludes has the"),
     ("update", "target(after)", "network(after)", "is that of the network; expected the target"),
     ("update", "target(after)", "target(before)", "the maximum is that of the state before"),
     ("update", ENDED, "best", "γ = 0.0 is nan: where the episode has ended, nothing is free and"),
