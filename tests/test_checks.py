@@ -155,7 +155,7 @@ MISTAKES = [  # in ``plain``: what is replaced, by what, and what is said
     ),
     ("update", BEST, "target(after).amax(dim=1)", "the mask is forgotten, and the maximum"),
     ("update", "~allowed_after", "allowed_after", "the mask is inverted"),
-    ("update", BEST, "(target(after) * allowed_after).amax(dim=1)", "what the mask excludes has the"),
+    ("update", BEST, "(target(after) * allowed_after).amax(dim=1)", "what the mask excludes has"),
     ("update", "target(after)", "network(after)", "is that of the network; expected the target"),
     ("update", "target(after)", "target(before)", "the maximum is that of the state before"),
     ("update", ENDED, "best", "γ = 0.0 is nan: where the episode has ended, nothing is free and"),
