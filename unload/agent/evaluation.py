@@ -128,6 +128,7 @@ class _Chooser:
         # Not the numbers that the load of the same seed is made of.
         self._rngs = [np.random.default_rng((seed, 1)) for seed in seeds]
         self._shared = np.random.default_rng(0)
+        self._at_first = self._shared.bit_generator.state
 
     def __call__(self, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
         if not self._draws():
@@ -140,7 +141,7 @@ class _Chooser:
 
     def _draws(self) -> bool:
         """Whether the policy has ever drawn from the generator that all episodes share."""
-        return self._shared.bit_generator.state != np.random.default_rng(0).bit_generator.state
+        return self._shared.bit_generator.state != self._at_first
 
     def _ask(self, observations, allowed, rng) -> np.ndarray:
         """What the policy returns is checked before anything is picked: it may be anybody's."""
