@@ -5,8 +5,8 @@
 A box with others on it is held down for certain, or simulated: ``TablePhysics`` decides which. The
 bounds of its rules (``table.MIDDLE`` and those below it) were chosen on the lifts of one part and
 thousands like them; the second part was drawn anew, and so was the third, in which are only the two
-answers that are rare. Both engines lift each box to the end, and what
-an empty table says by each stands beside it.
+answers that are rare. Both engines lift each box to the end, and what an empty table says by each
+stands beside it.
 """
 
 from collections.abc import Iterator
