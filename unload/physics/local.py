@@ -1,16 +1,21 @@
 """Lifts of a box in its situation: nothing else in the container is simulated."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
 from unload import task
 from unload.load.boxes import Load
 from unload.physics import mujoco
-from unload.physics.bullet import ENGINES, SETTINGS, World, engine_of, slim
+from unload.physics.bullet import ASKED_EVERY, ENGINES, SETTINGS, World, engine_of, slim
 from unload.physics.situation import RESOLUTION, Situation, Surroundings
 
 _MOST_BODIES = 10_000  # made in a world, before what PyBullet keeps of them is cleared away
+_TIMES_ASKED = 6  # whether a pull is hopeless: until a third of its time is left
+# m; in 21,000 lifts the cheaper simulation gave another answer 23 times, never farther than 2.4 mm
+# from the threshold.
+_CLOSE = 0.01
 
 
 def settings_of_lifts(engine: str) -> dict:
@@ -52,25 +57,70 @@ class LocalPhysics:
     def _pull(
         self, situation: Situation, hopeless: Callable[[float, float, float], bool] | None = None
     ) -> float:
-        """``simulate``, or give up early, see ``bullet.World.pull``."""
+        """``simulate``, or, if ``hopeless`` is given, a cheaper simulation with the same answer.
+
+        Its distance may differ from that of ``simulate`` by millimetres. What ends closer than
+        ``_CLOSE`` to the threshold is simulated once more, in full.
+
+        Args:
+            situation: of the box.
+            hopeless: called with how far the box has moved (m), its speed (m/s) and the time that
+                is left (s), each time ``ASKED_EVERY`` has passed. If it returns True, the pull is
+                given up, and 0 is returned.
+        """
         if self.engine == "mujoco":
             return round(mujoco.simulate(situation, hopeless), 6)
+        if hopeless is not None:
+            distance = self._quick_pull(situation, hopeless)
+            if abs(distance - task.LIFT_THRESHOLD) > _CLOSE:
+                return round(distance, 6)
+        with self._filled(situation) as (world, chosen):
+            return round(world.pull(chosen), 6)
+
+    def _quick_pull(
+        self, situation: Situation, hopeless: Callable[[float, float, float], bool]
+    ) -> float:
+        """About how far a box moves, in m; 0 if its pull is given up, see ``_pull``.
+
+        All fixed boxes are one body here, because PyBullet takes a tenth of a millisecond to make
+        a body. It solves their contacts in another order then, so that bits differ.
+        """
+        with self._filled(situation, one_body=True) as (world, chosen):
+            start, force = world.pose(chosen)[0], (0.0, 0.0, task.PICK_FORCE)
+            for number in range(1, _TIMES_ASKED + 1):
+                world.step(ASKED_EVERY, chosen, force)
+                left = task.LIFT_TIME - number * ASKED_EVERY
+                if hopeless(world.moved(chosen, start), world.speed(chosen), left):
+                    return 0.0
+            world.step(left, chosen, force)
+            return world.moved(chosen, start)
+
+    @contextmanager
+    def _filled(self, situation: Situation, one_body: bool = False) -> Iterator[tuple[World, int]]:
+        """The world with a situation's boxes, and which body is the chosen one; then it is emptied.
+
+        Args:
+            situation: of the box.
+            one_body: make one body of all boxes that are fixed.
+        """
         if self._world is None:
             self._world = World()
         elif self._world.bodies > _MOST_BODIES:
             self._world.clear()
 
         world = self._world
+        boxes = situation.boxes * RESOLUTION
+        all_boxes = list(zip(boxes[:, :3].tolist(), slim(boxes[:, 3:]).tolist()))
+        fixed = all_boxes[situation.dynamic :] + situation.floor_and_sides()
         bodies: list[int] = []
         try:
-            boxes = situation.boxes * RESOLUTION
-            places, sizes = boxes[:, :3].tolist(), slim(boxes[:, 3:]).tolist()
-            for row, (place, size) in enumerate(zip(places, sizes)):
-                mass = task.MASS if row < situation.dynamic else 0.0
-                bodies.append(world.add_box(place, size, mass))
-            for place, size in situation.floor_and_sides():
-                bodies.append(world.add_box(place, size, 0.0))
-            return round(world.pull(bodies[0], hopeless=hopeless), 6)
+            for place, size in all_boxes[: situation.dynamic]:
+                bodies.append(world.add_box(place, size, task.MASS))
+            if one_body and fixed:
+                bodies.append(world.add_fixed(fixed))
+            else:
+                bodies += [world.add_box(place, size, 0.0) for place, size in fixed]
+            yield world, bodies[0]
         finally:  # also when interrupted: what stays behind would be in the way of the next lift
             for body in reversed(bodies):
                 world.remove(body)

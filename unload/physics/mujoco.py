@@ -31,7 +31,7 @@ def simulate(
 
     Args:
         situation: of the box.
-        hopeless: see ``bullet.World.pull``.
+        hopeless: see ``LocalPhysics._pull``.
 
     Raises:
         FloatingPointError: MuJoCo gives a warning, for instance because a box flies off.
