@@ -197,7 +197,10 @@ def update(network, target, optimizer, picks, gamma):
 
 
 def pick(choose, envs, network, seen, epsilon, mask, rng):
-    """Pick once in each environment; return what is remembered of each, and what is seen next."""
+    """Pick once in each environment; return what is remembered of each, and what is seen next.
+
+    ``choose`` is the function above, or one of yours in its place.
+    """
     observations, infos = seen  # (E, 128, 3)
     allowed = infos["action_mask" if mask else "item_mask"].astype(bool)  # (E, 128)
     actions = choose(network, observations, allowed, epsilon, rng)  # (E,)

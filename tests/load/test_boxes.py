@@ -161,6 +161,6 @@ def test_contacts_that_are_not_compiled_are_the_same(full_load, monkeypatch):
     found = []
     for compiled in (True, False):
         monkeypatch.setattr(Compiled, "any_compiled", compiled)
-        found.append(_find_contacts(low, high))
+        found.append(_find_contacts(low, high, CONTACT_TOLERANCE))
     for one, other in zip(*found):
         assert np.array_equal(one, other) and one.dtype == other.dtype == np.int32

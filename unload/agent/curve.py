@@ -59,8 +59,8 @@ class Curve:
         """Add the point of the steps since the last one, after ``picks`` picks in all."""
         sums = self.sums
         reward, deadlocked = sums["rewards"] / sums["picks"], sums["deadlocked"] / sums["picks"]
-        # For rewards of ±1 this equals their ``success_rate`` in all bits; other tasks may pay
-        # other rewards.
+        # Computed so that for rewards of ±1 all bits are those of ``unload.success_rate``; other
+        # tasks may pay other rewards.
         balance = (2 * sums["successes"] - sums["picks"]) / sums["picks"]
         loss = sums["losses"] / sums["updates"] if sums["updates"] else float("nan")
         self.points.append(

@@ -128,7 +128,7 @@ class DQN:
     ) -> Callable[[], float]:
         """Begin an ``update`` whose arrays need no check, as those of a ``ReplayBuffer``.
 
-        The fused one goes on in other threads while this one acts.
+        The fused one goes on in other threads while the calling thread acts.
 
         Returns:
             A function that completes the update, returns the loss and may raise as ``update``

@@ -40,7 +40,7 @@ class PlainLearner:
         moments = {int(number): as_tensors(each) for number, each in state["state"].items()}
         groups = self.optimizer.param_groups
         self.optimizer.load_state_dict(as_tensors(state) | {"state": moments})
-        # Settings are put back in place, because what changes a learning rate may hold them.
+        # Settings are put back in place, because a scheduler may hold them.
         for group, loaded in zip(groups, self.optimizer.param_groups):
             group |= loaded
         self.optimizer.param_groups = groups

@@ -45,7 +45,8 @@ class Rollout:
             position_noise=config.position_noise,
             **own,
         )
-        # Others have no ``state_dict`` for a checkpoint; NEXT_STEP would count a reset as a pick.
+        # Other kinds of environments have no ``state_dict`` for a checkpoint, and NEXT_STEP would
+        # count a reset as a pick.
         mode = getattr(self.envs, "autoreset_mode", None)
         if not isinstance(self.envs, PickingVectorEnv) or mode is not AutoresetMode.SAME_STEP:
             kinds = "a ContainerVectorEnv or another PickingVectorEnv, in SAME_STEP"

@@ -32,7 +32,7 @@ from unload.support import checks, files
 
 CHECKPOINT_INTERVAL = 600.0  # seconds between two of them
 CURVE_INTERVAL = 1.0  # seconds between two versions of it on disk
-# PyTorch draws first weights otherwise without these instructions; with either, all bits agree.
+# With either of these instructions PyTorch draws the same first weights, without them others.
 INSTRUCTIONS = ("AVX2", "AVX512")
 
 

@@ -102,8 +102,8 @@ class RunFolder:
     def finish(self) -> None:
         """Mark the run as finished, whose policy and curve have been written."""
         digests = {path.name: files.digest(path) for path in (self.policy, self.curve)}
-        marks = {"marks": digests, "package": package()}
-        files.write_json(self._config_file, self._settings | marks, checked=True)
+        made = {"marks": digests, "package": package()}
+        files.write_json(self._config_file, self._settings | made, checked=True)
 
     def check_finished(self) -> None:
         """Raise ValueError unless what a finished run has left is whole, and of this run.
@@ -111,10 +111,10 @@ class RunFolder:
         Then its checkpoint, which nothing needs any more, is removed.
         """
         stored = files.read_json(self._config_file, checked=True)
-        marks, made_by = stored.pop("marks", {}), stored.pop("package", "an earlier unload")
+        digests, made_by = stored.pop("marks", {}), stored.pop("package", "an earlier unload")
         self._check_settings(stored)
         for path in (self.policy, self.curve):
-            files.check_digest(path, marks.get(path.name))
+            files.check_digest(path, digests.get(path.name))
         if made_by != package() and not self._same_code:
             said = f"{self.path} holds a run that {made_by} has trained, and this is {package()}"
             said += "; same_code=True says that both train in the same way"

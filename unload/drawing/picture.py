@@ -53,7 +53,7 @@ TRIANGLES = np.array([(a, b, c, a, c, d) for a, b, c, d in _RINGS]).reshape(12, 
 _EDGE = 0.55  # brightness of the edge of a face, as a share of that of the face
 _WIDTH = 8.0  # inches, at 100 pixels each
 _LEGEND = 0.15  # share of the width at the left
-_FILE_COLOURS = 128, Image.Quantize.MAXCOVERAGE  # of a still picture; a legend keeps its own
+_FILE_COLOURS = 128, Image.Quantize.MAXCOVERAGE  # of a still picture; keeps a legend's colours
 _NUMBERED = 50  # picks in a picture of an order
 
 
@@ -104,12 +104,11 @@ def numbered(load: Load, items: np.ndarray) -> bytes:
 
     Args:
         load: as it is before the first pick.
-        items: (k,) int, in the order in which they are picked.
+        items: (k,) int, all different, in the order in which they are picked.
     """
     first = items[:_NUMBERED]
     colours = np.tile(COLOURS["unseen"], (len(load), 1))
-    # Backwards, so that an item that is named twice has the colour of its first pick.
-    colours[first[::-1]] = colormaps["viridis_r"](np.linspace(0.1, 0.9, len(first)))[::-1, :3]
+    colours[first] = colormaps["viridis_r"](np.linspace(0.1, 0.9, len(first)))[:, :3]
     low, high = corners(load, np.arange(len(load)))
     figure = _drawn(low, high, colours, (_WIDTH, _WIDTH * 0.6), 0.0, load.container)
 
@@ -117,7 +116,7 @@ def numbered(load: Load, items: np.ndarray) -> bytes:
     # a convex face if it is on the same side of all four edges.
     drawn = np.argsort(back_to_front(low, high))  # the place of each box in the order of drawing
     faces = _faces(low, high, load.container)
-    for number, item in enumerate(dict.fromkeys(first.tolist()), 1):
+    for number, item in enumerate(first.tolist(), 1):
         later = faces[drawn > drawn[item]].reshape(-1, 4, 2)
         for middle in faces[item].mean(axis=1):
             sides, points = np.roll(later, -1, axis=1) - later, middle - later

@@ -47,7 +47,8 @@ class InOrder:
     """Raises an error if methods are called out of order.
 
     Subclasses set ``_state`` to ``"not started"``, ``"running"``, ``"finished"``, ``"closed"``, and
-    while they change an episode to ``"broken off"``, which it stays if that raises an error.
+    while they change an episode to ``"broken off"``, which it stays if that raises an error. A
+    ``PickingEnv`` has the state of its vector environment.
     """
 
     _state = "not started"

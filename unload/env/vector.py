@@ -50,7 +50,8 @@ class ContainerVectorEnv(PickingVectorEnv):
         self.physics: Any = make_physics(physics)
         self._containers = containers.allocate(self.num_envs, 0, 0)
         # Of each container: its load, and where all items of it are seen to be, (n, 3) in m. No
-        # step needs them, so that no checkpoint keeps them; a single environment shows them.
+        # step of this class needs them, so that no checkpoint keeps them; a single environment
+        # shows them.
         self._loads: list[Any] = [None] * self.num_envs
         self._seen_at: list[Any] = [None] * self.num_envs
 
@@ -108,8 +109,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         state = self._containers
         self._loads[env], self._seen_at[env] = load, positions
         order = observation.nearest(positions[items], len(items), load.container)
-        first = state.unloaded[env]  # those taken out count as the first ones, see ``Containers``
-        state.by_distance[env, first : first + len(items)] = items[order]
+        state.by_distance[env, : len(items)] = items[order]
         state.seen[env, : len(load)] = scale(positions, load.container)
         containers.show_nearest(state, env, *self._how_observed)
 

@@ -31,9 +31,10 @@ class Containers(NamedTuple):
         present: (E, capacity) bool, False for items that have been unloaded.
         left, unloaded: (E,) int64, how many items are there, and how many have been taken out.
         seen: (E, capacity, 3) float32, the scaled positions as observed.
-        by_distance: (E, capacity) int32, the items, nearest first. All before index ``unloaded`` +
-            128 are visible or unloaded. So a list that is sorted anew is written from index
-            ``unloaded`` on.
+        by_distance: (E, capacity) int32, the items that were left when they were last sorted,
+            nearest first.
+        upcoming: (E,) int64, the index there of the item that is shown next; all before it are
+            visible or have been unloaded.
         visible: (E, 128) int32, the item in each row of the observation, -1 in padded rows.
         values, ranks: (E, 3, 128) float32 and int32, scaled positions and ranks of the rows
             that hold an item.
@@ -52,6 +53,7 @@ class Containers(NamedTuple):
     unloaded: np.ndarray
     seen: np.ndarray
     by_distance: np.ndarray
+    upcoming: np.ndarray
     visible: np.ndarray
     values: np.ndarray
     ranks: np.ndarray
@@ -72,6 +74,7 @@ def allocate(num_envs: int, capacity: int, links: int) -> Containers:
         unloaded=np.zeros(num_envs, np.int64),
         seen=np.zeros((num_envs, capacity, 3), np.float32),
         by_distance=np.zeros((num_envs, capacity), np.int32),
+        upcoming=np.zeros(num_envs, np.int64),
         visible=np.zeros((num_envs, _N_VISIBLE), np.int32),
         values=np.zeros((num_envs, 3, _N_VISIBLE), np.float32),
         ranks=np.zeros((num_envs, 3, _N_VISIBLE), np.int32),
@@ -83,14 +86,14 @@ def allocate(num_envs: int, capacity: int, links: int) -> Containers:
 
 @compiled
 def show_nearest(containers, env, equalize, average):
-    """Show the nearest items of a container, by ``by_distance`` behind those unloaded."""
-    first = containers.unloaded[env]
+    """Show the nearest items of a container, whose ``by_distance`` has just been written."""
     rows = min(containers.left[env], _N_VISIBLE)
     for row in range(rows):
-        item = containers.by_distance[env, first + row]
+        item = containers.by_distance[env, row]
         containers.visible[env, row] = item
         for axis in range(3):
             containers.values[env, axis, row] = containers.seen[env, item, axis]
+    containers.upcoming[env] = rows
     containers.visible[env, rows:] = -1
     for axis in range(3):
         rank(containers.values[env, axis, :rows], containers.ranks[env, axis, :rows])
@@ -175,10 +178,10 @@ def unload_lifted(containers, actions, distances, equalize, average):
         for i in range(row, _N_VISIBLE - 1):
             visible[i] = visible[i + 1]
 
-        # The last row goes to the nearest item that has not been seen yet, if there is one: all
-        # before it in the order are visible, or have been unloaded.
+        # The last row goes to the nearest item that has not been seen yet, if there is one.
         if rows == _N_VISIBLE:
-            item = containers.by_distance[env, containers.unloaded[env] + _N_VISIBLE - 1]
+            item = containers.by_distance[env, containers.upcoming[env]]
+            containers.upcoming[env] += 1
             visible[_N_VISIBLE - 1] = item
             for axis in range(3):
                 replace(

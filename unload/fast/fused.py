@@ -70,8 +70,8 @@ def start_gradients(
 ) -> Callable[[], np.ndarray]:
     """Begin to compute the mean smooth-L1 loss of the chosen actions' values, and its gradients.
 
-    Up to ``torch.get_num_threads()`` threads do it, all but this one at once, which may do
-    something else meanwhile. The result does not depend on their number.
+    Up to ``torch.get_num_threads()`` threads do it. The others begin at once; this one joins them
+    when the returned function is called. The result does not depend on their number.
 
     Compiled code reads and writes wherever it is told to: the arrays must be as described, which
     ``DQN.update`` checks and a ``Training`` takes care of.

@@ -2,7 +2,8 @@
 
 ``unload.equalize`` sorts; here an item's rank is the number of smaller items, which needs
 no sorting, and when one item leaves and another comes, no recounting either. Arrays are
-(axes, items), so that the items of one axis lie side by side. Of equal items the first
+(axes, items), so that the items of one axis lie side by side; ``rank``, ``replace`` and ``remove``
+take those of one axis. Of equal items the first
 has the smaller rank, as in a stable sort. Where fewer than 128 items are left, they are the
 first ones of the arrays.
 """
@@ -70,7 +71,7 @@ def _twice_shared_ranks(values, ranks, twice):
 
 
 @compiled
-def features(values, ranks, equalize, average, observation, items=task.N_VISIBLE):
+def features(values, ranks, equalize, average, observation, items):
     """Write an observation: the values themselves, or equalized; then padding.
 
     Args:

@@ -19,6 +19,7 @@ from unload.support.compiled import compiled
 _SMALLEST_EDGE = 0.002
 CONTACT_TOLERANCE = 1e-4  # m, faces this close touch
 LARGEST_TOLERANCE = 0.1  # m
+_SMALLEST_FACE = 1e-6  # m², a smaller part of a face counts as none
 OVERLAP = 1e-6  # m, boxes that share more than this on each axis overlap
 ABOVE, BELOW, BESIDE = range(3)  # kinds of contact
 
@@ -82,8 +83,8 @@ class Load:
         ids: (n,) str, what a packing list calls the boxes; None without a list.
         container: (3,) float64, inner length, width and height in m; the paper's if not given.
         extras: name → (n,) array, what a packing list says besides; empty if not given.
-        contact_tolerance: largest vertical gap in m, at most 0.1, across which a box still counts
-            as lying on another one. So a box on two supports of slightly different measured
+        contact_tolerance: largest vertical gap in m, 0.0001 to 0.1, across which a box still
+            counts as lying on another one. So a box on two supports of slightly different measured
             heights touches both.
         contacts: which boxes touch, computed from positions and sizes.
 
@@ -238,8 +239,8 @@ def check_no_overhang(load: Load) -> None:
 
     # What lies on others with its whole face hangs over nothing, as all boxes of the paper's loads.
     aloft = low[:, 2] > CONTACT_TOLERANCE
-    wide = load.sizes[:, 0] * load.sizes[:, 1] - held > OVERLAP  # m²
-    for box in np.flatnonzero(aloft & wide).tolist():
+    partly_free = load.sizes[:, 0] * load.sizes[:, 1] - held > _SMALLEST_FACE
+    for box in np.flatnonzero(aloft & partly_free).tolist():
         rests, below = np.zeros(len(load), bool), [box]
         while below:
             others = load.contacts.of(BELOW, below.pop())
@@ -271,9 +272,7 @@ def slabs(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return groups
 
 
-def _find_contacts(
-    low: np.ndarray, high: np.ndarray, tolerance: float = CONTACT_TOLERANCE
-) -> Contacts:
+def _find_contacts(low: np.ndarray, high: np.ndarray, tolerance: float) -> Contacts:
     """Find which boxes stand on each other, and which stand side by side; BoxError if two overlap.
 
     Boxes touch only where they share a stretch of depth, and of height or width. Between one and

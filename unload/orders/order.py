@@ -64,16 +64,12 @@ def picking_order(load: Load, by: str | None = None, rule: Rule | None = None) -
             keys.
     """
     check_supported(load)
-    stops = None
-    if rule is None:
-        stops = None if by is None else _stops(load, by)
-        items = _reachable_first(load, stops)
-    elif by is not None:
+    if by is not None and rule is not None:
         raise ValueError("by and rule are given; expected one of them")
-    elif callable(rule):
-        items = _by_rule(load, rule)
-    else:
+    if rule is not None and not callable(rule):
         raise TypeError(f"rule is {rule!r}; expected a function of a load and what is present")
+    stops = None if by is None else _stops(load, by)
+    items = _reachable_first(load, stops) if rule is None else _by_rule(load, rule)
 
     names = items if load.ids is None else load.ids[items]
     columns = {"pick": 1 + np.arange(len(load)), "id": names, "item": items}

@@ -25,7 +25,8 @@ ROTATIONS = ("rotation", "yaw", "pitch", "roll")
 COLUMN_NAMES = {name: name for name in (*CENTRE, *CORNER, *SIZES, *ROTATIONS, "id")}
 COLUMN_NAMES |= zip(("pos_x", "pos_y", "pos_z", "length", "width", "height"), CORNER + SIZES)
 LARGEST_NUMBER = 1e6  # a length in mm is smaller
-# No code with zeros in front, nor one of more digits than a float64 holds.
+# What makes a cell of another column a number: not a code, which has zeros in front or more digits
+# than a float64 holds.
 NUMBER_PATTERN = r"-?(?=(\.?\d){1,15}$)(0|[1-9]\d*)(\.\d+)?"
 
 
@@ -54,8 +55,8 @@ def read_load(
     A length's name may end in its unit: ``length_mm``, ``x (cm)``. In mm, a number such as 1.200 is
     refused unless another one shows that its mark is of decimals, as 0.000 and 1200.5 do.
 
-    All other columns, such as a stop or a weight, become ``Load.extras``. Each line is one box;
-    quantities are ignored. In a file, columns without a name are left out.
+    Rotations and all other columns, such as a stop or a weight, become ``Load.extras``. Each line
+    is one box; quantities are ignored. In a file, columns without a name are left out.
 
     Args:
         path: of a CSV file (UTF-8; separated by commas, or by semicolons or tabs, where decimals
@@ -170,7 +171,7 @@ class _List:
         return places if self.place is CENTRE else places + sizes / 2, sizes
 
     def extras(self) -> dict[str, np.ndarray]:
-        """The columns that are not read, by their names."""
+        """The columns that are neither a place, an edge nor the id, by their names."""
         read = (*self.place, *SIZES, "id")
         others = [name for meaning, name in self.names.items() if meaning not in read]
         return {str(name): _extra(self._table[name]) for name in others}

@@ -14,8 +14,8 @@ def settle(
     """Move and shrink boxes until they lie on what is below, clear of what is beside, and inside.
 
     Each box may be off by ``tolerance``, two of them by twice that from each other. Two boxes that
-    share more than that of depth and of width lie one above the other; others stand side by side. A
-    larger fault is left as it is: a ``Load`` of such boxes is refused.
+    share more than twice the tolerance of depth and of width lie one above the other; others stand
+    side by side. A larger fault is left as it is: a ``Load`` of such boxes is refused.
 
     Args:
         low, sizes: (n, 3) float64, corners nearest to the origin and edge lengths in m.
@@ -81,8 +81,9 @@ def _rows(axis: int, low, high, start, end, tolerance: float) -> Rows:
     for place, box in enumerate(order):
         share, settled = _shared(low, high, place), _shared(start, end, place)
         # One stands before the other: apart along this axis, but for the fault of both, and at one
-        # height. Along x, pairs that overlap less along y are left out, because they are pushed
-        # apart there, and so are those clearly apart along y, which need nothing.
+        # height. Along x two kinds of pairs are left out: those that overlap less along y than
+        # along x, because they are pushed apart along y, and those with a gap between them along
+        # y, which need nothing.
         beside = (share[:, axis] <= 2 * tolerance) & (settled[:, 2] > OVERLAP)
         if axis == 0:
             beside &= (share[:, 0] <= share[:, 1]) & (share[:, 1] > -2 * tolerance)
@@ -125,6 +126,7 @@ def _apart(low, high, edges, rows: Rows, room: float, tolerance: float) -> np.nd
     example, A and B are 1 m long, and the room has 2 m. If they were measured from 0 and 0.996 m
     on, B is pushed to 1 m; if from 0.003 and 1.004 m on, B is pushed back to 1 m, and A to 0.
     """
+    # A box that reaches beyond a wall by more than the tolerance is left there, to be refused.
     first = np.where(low >= -tolerance, low.clip(0), low)
     last = np.where(high <= room + tolerance, room - edges, np.inf)
     for box, others in rows:
@@ -137,8 +139,8 @@ def _apart(low, high, edges, rows: Rows, room: float, tolerance: float) -> np.nd
 def uncarried(load: Load) -> np.ndarray:
     """The boxes whose centre of mass no support carries, (k,) int64: left alone, they tip.
 
-    A centre is carried if it lies above the floor or within the smallest convex shape around the
-    faces that the box stands on, each made smaller by ``SLACK`` as in the physics.
+    A centre is carried if the box stands on the floor, or if it lies within the smallest convex
+    shape around the faces that the box stands on, each made smaller by ``SLACK`` as in the physics.
     """
     low, high = load.positions - load.sizes / 2, load.positions + load.sizes / 2
     tipping = []

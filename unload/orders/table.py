@@ -149,7 +149,8 @@ def _excel(content: bytes) -> Iterable[list[str]]:
     """The cells of each line of the first sheet of cells that is not hidden."""
     with checks.needed_for("an Excel file"):
         from openpyxl import load_workbook
-    # Pictures are left out; what remains is as long as the archive says, or damaged.
+    # Pictures are left out. Of what remains the archive tells the length, and reading more than
+    # that fails; so these limits hold for a few bytes, too, that unpack to gigabytes.
     copy, instead = BytesIO(), "; save it as CSV"
     with ZipFile(BytesIO(content)) as parts, ZipFile(copy, "w") as reduced:
         _check("parts", len(parts.infolist()), instead)

@@ -44,13 +44,8 @@ class FullPhysics:
         # Rigid bodies are twice as fast to lift, but moving them far, as putting boxes back does,
         # rebuilds a part of Bullet's search tree. Where nothing is put back, they pay.
         world = World(maximal_coordinates=self.after_pick == "keep")
-        self._fill(load, world, slim(np.rint(load.sizes / RESOLUTION) * RESOLUTION))
-        self.load, self.present = load, np.ones(len(load), bool)
-
-    def _fill(self, load: Load, world: World, sizes: np.ndarray) -> None:
-        """Put the boxes of a load into an empty world, as bodies of ``sizes``, (n, 3) in m."""
         self._world = world
-        length, width, height = self._container = load.container
+        length, width, height = load.container
         for position, size in (
             ((length / 2, width / 2, -0.5), (length + 2, width + 2, 1)),  # floor
             ((length / 2, -0.5, height / 2), (length + 2, 1, height)),  # side walls
@@ -59,16 +54,18 @@ class FullPhysics:
             ((0, 0, _DEPOT - 0.5), (2000, 2000, 1)),
         ):
             world.add_box(position, size, 0)
+        sizes = slim(np.rint(load.sizes / RESOLUTION) * RESOLUTION)
         self._bodies = [
             world.add_box(position, size, task.MASS)
             for position, size in zip(load.positions, sizes)
         ]
         self._poses: list[tuple] = [(place, UPRIGHT) for place in load.positions.tolist()]
+        self.load, self.present = load, np.ones(len(load), bool)
 
     def _park(self, body: int) -> None:
         """Move a body to a place of its own in the depot."""
         row, column = divmod(body, 100)
-        length, width, height = self._container
+        length, width, height = self.load.container
         place = ((length + 1) * row, (width + 0.5) * column, _DEPOT + height / 2)
         self._world.place(body, place)
 

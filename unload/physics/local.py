@@ -24,7 +24,7 @@ def settings_of_lifts(engine: str) -> dict:
 
 
 class LocalPhysics:
-    """Simulates the situation of the chosen box, on the load's exact grid.
+    """Simulates the situation of the chosen box, at the places of the load, without noise.
 
     The chosen box and all that rests on it are free to move; what they stand on, their
     neighbours in the wall, the floor and the side walls are fixed; the rest is left out.

@@ -109,7 +109,7 @@ def find_movers(starts, links, present, item, members, most):
         present: (n,) bool, the boxes that are there.
         item: its number.
         members: (n,) int32; the boxes found are written to its start, the item first.
-        most: after so many the search ends.
+        most: after so many the search ends; at least 2.
     """
     members[0], dynamic, done = item, 1, 0
     while done < dynamic:
