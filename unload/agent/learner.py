@@ -42,7 +42,7 @@ class PlainLearner:
         self.optimizer.load_state_dict(as_tensors(state) | {"state": moments})
         # Settings are put back in place, because a scheduler may hold them.
         for group, loaded in zip(groups, self.optimizer.param_groups):
-            group |= loaded
+            group.update(loaded)
         self.optimizer.param_groups = groups
 
     def best_actions(self, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
@@ -104,18 +104,16 @@ def best_actions(
         (batch,) int64.
 
     Raises:
-        FloatingPointError: a row has no allowed action of a finite value.
+        FloatingPointError: an allowed action has a value that is not finite.
     """
     arguments = [torch.from_numpy(observations)]
     if present is not None and not present.all():  # other modules need not know of padding
         arguments.append(torch.from_numpy(present))
-    values = network(*arguments).masked_fill(torch.from_numpy(~allowed), -torch.inf)
-    actions = values.argmax(dim=1)  # NaN counts as the highest
-    finite = values.gather(1, actions[:, None]).isfinite()
-    if not finite.all():
-        row = int(finite.int().argmin())
+    values, may_pick = network(*arguments), torch.from_numpy(allowed)
+    wrong = (may_pick & ~values.isfinite()).any(dim=1)
+    if wrong.any():
         raise FloatingPointError(
-            f"row {row} has no allowed action of a finite value; "
+            f"row {int(wrong.int().argmax())} has an allowed action whose value is not finite; "
             "expected finite observations and weights"
         )
-    return actions.numpy()
+    return values.masked_fill(~may_pick, -torch.inf).argmax(dim=1).numpy()

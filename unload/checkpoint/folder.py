@@ -64,7 +64,7 @@ class RunFolder:
 
     @property
     def finished(self) -> bool:
-        """Whether the run has ended, and its policy is whole."""
+        """Whether the run has ended; ``check_finished`` finds what was damaged since then."""
         return self._config_file.exists()
 
     def save(self, run: Any) -> None:

@@ -1,9 +1,9 @@
 """The bases of single and vector environments: settings and order of calls.
 
 ``gymnasium.make_vec(id, num_envs)`` makes a vector environment. It behaves, bit for bit, as
-Gymnasium's ``SyncVectorEnv`` of the single environments with the same ``autoreset_mode``: same
-seeds, same actions, same observations, rewards, masks and infos. A single one is a vector
-environment of one.
+Gymnasium's ``SyncVectorEnv`` of the single environments with the same arguments, ``physics`` and
+``autoreset_mode`` included: same seeds, same actions, same observations, rewards, masks and infos.
+A single one is a vector environment of one.
 
 They are registered without Gymnasium's ``max_episode_steps``, which would wrap them and cut every
 episode there, whatever their own ``max_picks`` is.
@@ -46,8 +46,8 @@ def check_options(options: dict | None, known: tuple[str, ...]) -> dict[str, Loa
 class InOrder:
     """Raises an error if methods are called out of order.
 
-    Subclasses set ``_state`` to ``"not started"``, ``"running"``, ``"finished"``, ``"closed"``, and
-    while they change an episode to ``"broken off"``, which it stays if that raises an error. A
+    Subclasses set ``_state`` to ``"not started"``, ``"running"``, ``"finished"`` or ``"closed"``,
+    and to ``"broken off"`` while they change an episode; if that raises an error, it stays so. A
     ``PickingEnv`` has the state of its vector environment.
     """
 

@@ -135,13 +135,13 @@ def best_actions(weights: Weights, observations: np.ndarray, allowed: np.ndarray
         (batch,) int64.
 
     Raises:
-        FloatingPointError: a row has no allowed action of a finite value.
+        FloatingPointError: an allowed action has a value that is not finite.
     """
     actions = np.full(len(observations), -1)
     best_items(observations, allowed, weights.weight, weights.bias, weights.score[0], actions)
     if (actions < 0).any():
         raise FloatingPointError(
-            f"row {int(np.argmin(actions))} has no allowed action of a finite value; "
+            f"row {int(np.argmin(actions))} has an allowed action whose value is not finite; "
             "expected finite observations and weights"
         )
     return actions

@@ -222,7 +222,7 @@ def check_supported(load: Load, name: str = "load") -> None:
     unsupported = np.diff(load.contacts.starts[BELOW]) == 0
     aloft = np.flatnonzero(unsupported & (bottom > CONTACT_TOLERANCE))
     if aloft.size:
-        wanted = f"expected it, within {load.contact_tolerance} m, on the floor or on another box"
+        wanted = f"expected it on the floor, or within {load.contact_tolerance} m on another box"
         place = f"floats in {name}, its lower face at {bottom[aloft[0]]:.6g} m"
         raise BoxError(aloft, f"{place}; {wanted}")
 
@@ -264,7 +264,7 @@ def check_stack(stack: object) -> None:
 
 
 def slabs(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Number groups of intervals, (n,) int64 from 0, between which there is no overlap."""
+    """The group of each interval, (n,) int64 from 0; those of different groups do not overlap."""
     order = np.argsort(low, kind="stable")
     reach = np.maximum.accumulate(high[order])
     groups = np.empty(len(low), np.int64)

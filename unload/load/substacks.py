@@ -78,7 +78,7 @@ def build_load(variants: np.ndarray) -> Load:
     filled = np.arange(cells.shape[3]) < counts[..., np.newaxis]  # (walls, rows, 4, m)
     walls, rows, _, _ = np.nonzero(filled)  # (n,) each, as of all that follows
     packages, left, low = cells[filled].T
-    # In walls and cells, (n, 3), and in m: a wall is as deep as each of its boxes.
+    # Each box is a wall deep, and as many cells wide and high as its package. ``units`` are in m.
     edges = np.insert(PACKAGES, 0, 1, axis=1)[packages]
     units = np.array([task.CONTAINER[0] / (walls[-1] + 1), CELL, CELL])
     positions = (np.column_stack([walls, left, low + rows * CELLS_HIGH]) + edges / 2) * units

@@ -132,9 +132,9 @@ def _reachable_first(load: Load, stops: np.ndarray | None) -> np.ndarray:
             present[item] = False
             order.append(item)
             for counts, lists in zip(waits_for, frees):
-                others = lists[item]
-                counts[others] -= 1
-                for box in others[counts[others] == 0]:
+                freed = lists[item]
+                counts[freed] -= 1
+                for box in freed[counts[freed] == 0]:
                     heappush(heap, key(box))
     return np.array(order)
 

@@ -65,8 +65,8 @@ class LocalPhysics:
         Args:
             situation: of the box.
             hopeless: called with how far the box has moved (m), its speed (m/s) and the time that
-                is left (s), each time ``ASKED_EVERY`` has passed. If it returns True, the pull is
-                given up, and 0 is returned.
+                is left (s), each time ``ASKED_EVERY`` has passed, by PyBullet until a third of the
+                time is left. If it returns True, the pull is given up, and 0 is returned.
         """
         if self.engine == "mujoco":
             return round(mujoco.simulate(situation, hopeless), 6)

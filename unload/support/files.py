@@ -60,7 +60,10 @@ def write_json(path: str | Path, value: Any, checked: bool = False) -> None:
 
 
 def read_json(path: str | Path, checked: bool = False) -> dict:
-    """Read a JSON file that holds an object; without its ``digest``, needed if ``checked``."""
+    """Read a JSON file that holds an object.
+
+    Its last entry, ``digest``, is compared and left out; if ``checked``, it must be there.
+    """
     try:
         value = json.loads(Path(path).read_text(encoding="utf-8"))
     except (ValueError, RecursionError, MemoryError) as error:  # RecursionError: of deep nesting
@@ -92,7 +95,7 @@ def write_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
 
 
 def read_arrays(path: str | Path, checked: bool = False) -> dict[str, np.ndarray]:
-    """Read an ``.npz`` file of plain arrays; without their ``digest``, needed if ``checked``."""
+    """Read an ``.npz`` file of plain arrays; their ``digest`` as in ``read_json``."""
     # Opened here, because NumPy leaves a damaged file open that it has opened itself.
     with open(path, "rb") as file:
         try:
