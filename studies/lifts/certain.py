@@ -4,9 +4,9 @@
 
 A box with others on it is held down for certain, or simulated: ``TablePhysics`` decides which. The
 bounds of its rules (``table.MIDDLE`` and those below it) were chosen on the lifts of one part and
-thousands like them; the second part was drawn anew, and so was the third, in which are only the two
-answers that are rare. Both engines lift each box to the end, and what an empty table says by each
-stands beside it.
+thousands like them; the second part was drawn anew, and so were the third, in which are only the
+two answers that are rare, and the fourth, in which are only lifts that no rule answers. Both engines
+lift each box to the end, and what an empty table says by each stands beside it.
 """
 
 from collections.abc import Iterator
@@ -31,13 +31,18 @@ from unload.physics.table import HELD_DOWN, MIDDLE, LiftTable, TablePhysics, hel
 
 NAME = "certain_lifts"
 # First seed of a part, and how many lifts of each family; no other data uses these seeds.
-PARTS = {"bounds": (1_100_000, 100), "drawn anew": (1_500_000, 600), "rare": (1_900_000, 150)}
+PARTS = {
+    "bounds": (1_100_000, 100), "drawn anew": (1_500_000, 600), "rare": (1_900_000, 150),
+    "simulated": (2_300_000, 1_000),
+}  # fmt: skip
 PER_LOAD = 25  # lifts of a load, at most
 ASKED = 0.2  # share of the failing picks that are asked about
 # Besides the families: boxes of any proportions, one or two on another, which stands alone or not.
 STACKS = ("made-up stacks", "made-up stacks between others", "made-up bridges")
 RARE = ("side by side", "between others")  # answers
-WITH_RARE = ("bricked walls", "crossed layers", *STACKS[1:])  # whose boxes get them
+# What a part is drawn from, if not from all, and which answers it has.
+SOME = ("bricked walls", "crossed layers", *STACKS[1:])
+ONLY = {"rare": RARE, "simulated": ("given up early", "simulated to the end")}
 EDGES = (0.05, 1.5)  # m, of boxes of these stacks
 MAX_OFFSET = 1.2  # half edges, their common centre
 COLUMNS = [
@@ -52,7 +57,7 @@ ANSWERS = (
 
 
 def certain_data() -> None:
-    """Ask about all lifts of both parts: ``certain_lifts.csv``, a row each.
+    """Ask about all lifts of all parts: ``certain_lifts.csv``, a row each.
 
     ``on_top`` is the number of boxes on the chosen one. ``common`` says how far their common centre
     is from its centre, in half edges, the larger of x and y; ``farthest`` the same of the one that
@@ -74,11 +79,10 @@ def ask_all() -> pd.DataFrame:
     tables = {f"table_{engine}": TablePhysics(LiftTable(engine)) for engine in ENGINES}
     rows = []
     for part, (seed, lifts) in PARTS.items():
-        rare = part == "rare"
-        for family in WITH_RARE if rare else (*FAMILIES, *STACKS):
+        for family in SOME if part in ONLY else (*FAMILIES, *STACKS):
             asked = _stacks(family, seed) if family in STACKS else _blocked(family, seed)
-            if rare:
-                asked = (each for each in asked if _answer(each, 0.0) in RARE)
+            if part in ONLY:
+                asked = (each for each in asked if _answer(each, 0.0) in ONLY[part])
             for _, situation in zip(range(lifts), asked):
                 said = {name: each.simulate(situation) for name, each in (exact | tables).items()}
                 row = {"part": part, "family": family, "on_top": situation.on_top, **said}
