@@ -4,9 +4,9 @@
 
 A box with others on it is held down for certain, or simulated: ``TablePhysics`` decides which. The
 bounds of its rules (``table.MIDDLE`` and those below it) were chosen on the lifts of one part and
-thousands like them; the second part was drawn anew, and so were the third, in which are only the
-two answers that are rare, and the fourth, in which are only lifts that no rule answers. Both engines
-lift each box to the end, and what an empty table says by each stands beside it.
+thousands like them. All others were drawn anew: a second part like the first, a third of the answer
+that is rare, and a fourth of lifts that no rule answers. Both engines lift each box to the end, and
+what an empty table says by each stands beside it.
 """
 
 from collections.abc import Iterator
@@ -38,21 +38,23 @@ PARTS = {
 PER_LOAD = 25  # lifts of a load, at most
 ASKED = 0.2  # share of the failing picks that are asked about
 # Besides the families: boxes of any proportions, one or two on another, which stands alone or not.
-STACKS = ("made-up stacks", "made-up stacks between others", "made-up bridges")
-RARE = ("side by side", "between others")  # answers
-# What a part is drawn from, if not from all, and which answers it has.
-SOME = ("bricked walls", "crossed layers", *STACKS[1:])
-ONLY = {"rare": RARE, "simulated": ("given up early", "simulated to the end")}
+STACKS = ("made-up stacks", "made-up stacks between others")
+# Parts that are drawn from some families alone, and have one answer before anything is simulated.
+ONLY = {
+    "rare": (("bricked walls", STACKS[1]), "between others"),
+    "simulated": (("bricked walls", "crossed layers", *STACKS), "given up early"),
+}
 EDGES = (0.05, 1.5)  # m, of boxes of these stacks
 MAX_OFFSET = 1.2  # half edges, their common centre
 COLUMNS = [
     "part", "family", "on_top", "common", "farthest", "answer", *ENGINES,
     *(f"table_{engine}" for engine in ENGINES),
 ]  # fmt: skip
-COLOURS = dict(zip((*FAMILIES, *STACKS), ("C0", "C1", "C2", "C3", "C4", "C5", "#e377c2")))
+COLOURS = dict(zip((*FAMILIES, *STACKS), ("C0", "C1", "C2", "C3", "C4", "#e377c2")))
 BOUNDS = ("middle", "covered", "flat", "hardly")  # see ``physics.table``
 ANSWERS = (
-    "three or more on top", "on its middle", *RARE, "given up early", "simulated to the end",
+    "three or more on top", "on its middle", "between others", "given up early",
+    "simulated to the end",
 )  # fmt: skip
 
 
@@ -79,10 +81,11 @@ def ask_all() -> pd.DataFrame:
     tables = {f"table_{engine}": TablePhysics(LiftTable(engine)) for engine in ENGINES}
     rows = []
     for part, (seed, lifts) in PARTS.items():
-        for family in SOME if part in ONLY else (*FAMILIES, *STACKS):
+        families, answer = ONLY.get(part, ((*FAMILIES, *STACKS), None))
+        for family in families:
             asked = _stacks(family, seed) if family in STACKS else _blocked(family, seed)
-            if part in ONLY:
-                asked = (each for each in asked if _answer(each, 0.0) in ONLY[part])
+            if answer is not None:
+                asked = (each for each in asked if _answer(each, 0.0) == answer)
             for _, situation in zip(range(lifts), asked):
                 said = {name: each.simulate(situation) for name, each in (exact | tables).items()}
                 row = {"part": part, "family": family, "on_top": situation.on_top, **said}
@@ -125,14 +128,14 @@ def over_middle(frame: pd.DataFrame) -> Figure:
 
     Args:
         frame: see ``certain_data``. The rule answers filled dots: those in the shaded part, and
-            others that lie side by side or between two.
+            others that stand between two.
     """
     figure, panels = plt.subplots(1, HELD_DOWN - 1, figsize=(9, 3.6), sharex=True, sharey=True)
     for on_top, axes in enumerate(panels, 1):
         lifts = frame[frame["on_top"] == on_top]
         for family, colour in COLOURS.items():
             group = lifts[lifts["family"] == family]
-            ruled = group["answer"].isin(ANSWERS[1:4])
+            ruled = group["answer"].isin(ANSWERS[1:3])
             for some, face in ((group[ruled], colour), (group[~ruled], "none")):
                 dots = {"s": 14, "edgecolor": colour, "facecolor": face, "linewidth": 0.7}
                 label = family if face == "none" else None
@@ -151,9 +154,8 @@ def _answer(situation: Situation, distance: float) -> str:
     if situation.on_top >= HELD_DOWN:
         return ANSWERS[0]
     if held_by_rule(np.frombuffer(situation.key, np.int32)):
-        common, farthest = offsets(situation)
-        return ANSWERS[2 if farthest > 1 else 1 if common <= MIDDLE else 3]
-    return ANSWERS[5] if distance else ANSWERS[4]
+        return ANSWERS[1 if offsets(situation)[0] <= MIDDLE else 2]
+    return ANSWERS[4] if distance else ANSWERS[3]
 
 
 def _blocked(family: str, seed: int) -> Iterator[Situation]:
@@ -182,13 +184,13 @@ def _stacks(kind: str, seed: int) -> Iterator[Situation]:
     """Boxes of any proportions on the floor, each with one or two boxes of any proportions on it.
 
     Of two, one stands on the other or beside it. Those of the second kind stand between two more
-    boxes on the floor. In those of the third kind two stand side by side, each on a post, too.
+    boxes on the floor.
     """
     rng = np.random.default_rng([seed, len(FAMILIES) + STACKS.index(kind)])
     while True:
-        boxes = np.zeros((3 if kind == STACKS[2] else rng.integers(2, 4), 6))
+        boxes = np.zeros((rng.integers(2, 4), 6))
         boxes[:, 3:] = _sizes(rng, len(boxes))
-        tower = kind != STACKS[2] and rng.random() < 0.5
+        tower = rng.random() < 0.5
         for row in range(1, len(boxes)):
             base = boxes[row - 1 if tower else 0]
             reach = (base[3:5] + boxes[row, 3:5]) / 2 - 0.002  # m, of a shared stretch at least
@@ -197,8 +199,6 @@ def _stacks(kind: str, seed: int) -> Iterator[Situation]:
         dynamic = len(boxes)
         if kind == STACKS[1]:
             boxes = np.vstack([boxes, _neighbours(rng, boxes[0, 3:])])
-        elif kind == STACKS[2]:
-            boxes = np.vstack([boxes, _posts(rng, boxes)])
 
         floor = round(-boxes[0, 5] / 2 * 1e6)
         made = Situation(np.rint(boxes * 1e6).astype(np.int32), dynamic, floor, ())
@@ -222,21 +222,6 @@ def _neighbours(rng: np.random.Generator, size: np.ndarray) -> np.ndarray:
     boxes[:, 1] = (size[1] + boxes[:, 4]) / 2 * (-1, 1)
     boxes[:, 2] = (boxes[:, 5] - size[2]) / 2
     return boxes
-
-
-def _posts(rng: np.random.Generator, boxes: np.ndarray) -> np.ndarray:
-    """For each of two boxes on another one a post that is as high as that one, (2, 6) in m.
-
-    Half of these pairs stand under the far halves of the two; the others anywhere under them.
-    """
-    posts, upper = np.zeros((2, 6)), boxes[1:]
-    posts[:, 3:] = _sizes(rng, 2)
-    posts[:, 5] = boxes[0, 5]
-    offsets = rng.uniform(-1, 1, (2, 2)) * ((upper[:, 3:5] + posts[:, 3:5]) / 2 - 0.002)
-    if rng.random() < 0.5:
-        offsets = np.copysign(offsets, upper[:, :2])
-    posts[:, :2] = upper[:, :2] + offsets
-    return posts
 
 
 def _sizes(rng: np.random.Generator, count: int) -> np.ndarray:

@@ -116,41 +116,6 @@ def test_between_others_a_box_is_held_wherever_the_load_is_above_it(situation, h
     assert held_by_rule(np.frombuffer(situation.key, np.int32)) == held
 
 
-BOTH = [(1.2, 0), (-1.2, 0)]
-
-
-@pytest.mark.parametrize(
-    ("situation", "held"),
-    [
-        (between((2, 0, 0), (-2, 0, 0), centres=BOTH), True),
-        (between((2, 0, 0), centres=BOTH), False),
-        (between((2, 0, 0), (-2, 0, 0), centres=BOTH[:1]), False),
-        (between((2, 0, 0), (-2, 0, 0), centres=[*BOTH, (0, 0)]), False),
-        (between((1.2, 0, 0), (-1.2, 0, 0), centres=BOTH), True),
-        (between((1.2, 0, 0), (-1.19, 0, 0), centres=BOTH), False),
-        (between((2, 0, 0), (-2, 0.99, 0), centres=BOTH), True),
-        (between((2, 0, 0), (-2, 1.01, 0), centres=BOTH), False),
-        (between((2, 0, 0), (-2, 0, 0), centres=[(1.2, 0.9), (-1.2, -0.9)]), True),
-        (between((2, 1.1, 0), (-2, 0, 0), centres=[(1.2, 1.01), (-1.2, -0.9)]), False),
-        (between((2, 0, 0), (-3.21, 0, 0), centres=BOTH), False),
-        (between((2, 0, 0), (-2, 0, -0.01), centres=BOTH), False),
-        (between((2, 0, 0), (-2, 0, 0), centres=[(1.2, 0), (-0.1, 0)]), True),
-        (between((2, 0, 0), (-2, 0, 0), centres=[(1.2, 0), (-0.09, 0)]), False),
-        (between((2, 0, 0), (-2, 0, 0), centres=[(1.2, 0), (1.2, 0)]), False),
-        (between((0.9, 2, 0), (1.1, -2, 0), centres=[(0.1, 1.2), (0.2, -1.2)]), True),
-        (between((0.9, 1.19, 0), (1.1, -2, 0), centres=[(0.1, 1.2), (0.2, -1.2)]), False),
-    ],
-)
-def test_two_side_by_side_hold_a_box_down_if_their_far_ends_lie_on_others(situation, held):
-    assert held_by_rule(np.frombuffer(situation.key, np.int32)) == held
-
-
-def test_of_two_side_by_side_none_stands_on_the_other():
-    tower = between((2, 0, 0), (-2, 0, 0), centres=BOTH)
-    tower.boxes[2, 2] += SIDE
-    assert not held_by_rule(np.frombuffer(tower.key, np.int32))
-
-
 @pytest.mark.parametrize(("height", "held"), [(0.25, True), (0.24, False)])
 def test_a_flat_box_tips_within_the_gaps(height, held):
     boxes = np.array([[0, 0, 0], [0, 0.45, 0.5], [0, -1, 0], [0, 1, 0]])

@@ -147,7 +147,7 @@ class World:
         maximal_coordinates: bool = True,
         iterations: int = ITERATIONS,
     ) -> None:
-        self.time_step, self._iterations = time_step, iterations
+        self.time_step, self.iterations = time_step, iterations
         self._maximal = maximal_coordinates
         self.client = Client()
         self.clear()
@@ -158,10 +158,7 @@ class World:
         self.bodies = 0
         self.client.resetSimulation()
         self.client.setGravity(0, 0, -task.GRAVITY)
-        self.client.setPhysicsEngineParameter(
-            numSolverIterations=self._iterations,
-            deterministicOverlappingPairs=1,
-        )
+        self.client.setPhysicsEngineParameter(deterministicOverlappingPairs=1)
 
     def add_box(
         self,
@@ -236,6 +233,10 @@ class World:
         """Position (m) and orientation (quaternion x, y, z, w) of a body."""
         return self.client.getBasePositionAndOrientation(body)
 
+    def velocity(self, body: int) -> tuple[float, ...]:
+        """Velocity of a body's centre along x, y and z, in m/s."""
+        return self.client.getBaseVelocity(body)[0]
+
     def step(
         self,
         seconds: float,
@@ -252,7 +253,9 @@ class World:
             # power of two, because PyBullet divides the time by it, and only that is exact.
             many = 1 << (steps.bit_length() - 1)
             self.client.setPhysicsEngineParameter(
-                fixedTimeStep=many * self.time_step, numSubSteps=many
+                fixedTimeStep=many * self.time_step,
+                numSubSteps=many,
+                numSolverIterations=self.iterations,
             )
             if body is not None:
                 place, frame = self.pose(body)[0], self.client.WORLD_FRAME
@@ -273,17 +276,9 @@ class World:
             force: N.
             seconds: how long, rounded to whole time steps.
         """
-        start = self.pose(body)[0]
+        start = np.array(self.pose(body)[0])
         self.step(seconds, body, (0.0, 0.0, force))
-        return self.moved(body, start)
-
-    def moved(self, body: int, start: tuple[float, ...]) -> float:
-        """How far a body is from a place, in m."""
-        return float(np.linalg.norm(np.array(self.pose(body)[0]) - np.array(start)))
-
-    def speed(self, body: int) -> float:
-        """The speed of a body's centre, in m/s."""
-        return float(np.linalg.norm(self.client.getBaseVelocity(body)[0]))
+        return float(np.linalg.norm(np.array(self.pose(body)[0]) - start))
 
     def close(self) -> None:
         """Disconnect the client; may be called again."""

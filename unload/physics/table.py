@@ -28,12 +28,8 @@ PhysicsName = Literal["local", "places", "table"]
 
 UNKNOWN = -1  # in place of a distance that is not in the table
 HELD_DOWN = 3  # so many boxes on top hold a box down
-# One or two boxes on top hold the chosen box down, too, if they press near its centre. Measured
-# along one axis, 0 is the centre of the chosen box and 1 its edge. A box on top presses at its own
-# centre; the mean of these points must lie within ±MIDDLE along x and along y. A box whose centre
-# lies beyond the edge counts as pressing at the edge, but only if it is a bridge (see
-# ``_bridges``): two boxes lie side by side on the chosen one, and the far end of this one lies on
-# another box.
+# One or two boxes on top hold the chosen box down, too, if their centres lie above it, and the mean
+# of these near its middle: within ±MIDDLE along x and y, where 0 is its centre and 1 its edge.
 MIDDLE = 0.45
 # A box that stands between others cannot tip sideways. So along y the mean may lie anywhere from
 # edge to edge. A box counts as between others if they cover at least this share of its left and of
@@ -100,8 +96,8 @@ class LiftTable:
         digest = situation.digest
         with self._adding:
             digests, micrometres = self.entries
-            if find_distance(digests, micrometres, digest) == UNKNOWN:
-                place = np.searchsorted(digests, digest)
+            place = np.searchsorted(digests, digest)
+            if place == len(digests) or digests[place] != digest:
                 new = _inserted(micrometres, place, round(distance * 1e6))
                 self.entries = _inserted(digests, place, digest), new
 
@@ -245,13 +241,11 @@ def held_by_rule(key):
     """Whether what lies on the chosen box, one box or two, holds it down.
 
     In random loads and random stacks of boxes of any proportions, no lift contradicts this
-    (``data/certain_lifts.csv``); a search beyond these finds cases of two boxes side by side that
-    do.
+    (``data/certain_lifts.csv``).
 
     The pull can raise 1.04 boxes besides the chosen one. So with one box on its middle the chosen
     one rises by 9 mm only. With one off its middle it tips aside, unless it stands between others.
-    Two boxes hold it down even if neighbours carry their other ends: it then bears half of the
-    weight of each, together that of one box. See ``MIDDLE`` and ``COVERED``.
+    See ``MIDDLE`` and ``COVERED``.
 
     Args:
         key: the words of a situation's key, see ``Situation.key``.
@@ -264,7 +258,7 @@ def held_by_rule(key):
 
 @compiled
 def _presses_within(key, first, along_x, along_y):
-    """Whether the boxes on top press on the chosen one so near its centre, on average.
+    """Whether the centres on top lie above the chosen box, and on average so near its centre.
 
     Args:
         key: the words of a situation's key.
@@ -276,43 +270,12 @@ def _presses_within(key, first, along_x, along_y):
         edge, total = key[first + 3 + axis], 0.0
         for box in range(1, on_top + 1):
             centre = key[first + 6 * box + axis]
-            if 2 * abs(centre) <= edge:
-                total += centre
-            elif _bridges(key, first, box, axis):
-                total += np.sign(centre) * edge / 2
-            else:
+            if 2 * abs(centre) > edge:
                 return False
+            total += centre
         if 2 * abs(total) > middle * on_top * edge:
             return False
     return True
-
-
-@compiled
-def _bridges(key, first, box, axis):
-    """Whether two lie side by side on the chosen box, and this one's far end on another box.
-
-    On the other horizontal axis its centre must lie above both that carry it: then it cannot tip
-    about a corner.
-    """
-    upper, across = first + 6 * box, 1 - axis
-    if key[0] != 3 or 2 * abs(key[upper + across]) > key[first + 3 + across]:
-        return False
-    for on in (first + 6, first + 12):  # the two on top, both on the chosen box itself
-        if abs(key[on + 2] - (key[on + 5] + key[first + 5]) / 2) > NEAR:
-            return False
-    side = 1 if key[upper + axis] > 0 else -1
-    # Of the boxes that cannot move, one must carry the far end: lie right below, under the middle
-    # line, and reach out as far. ``away``: how far outwards its centre lies from that of the
-    # bridge.
-    for lower in range(first + 18, len(key), 6):
-        away, edge = side * (key[lower + axis] - key[upper + axis]), key[lower + 3 + axis]
-        touches = _shared(away, edge, key[upper + 3 + axis]) > 0
-        gap = key[upper + 2] - key[lower + 2] - (key[upper + 5] + key[lower + 5]) / 2
-        carries = 2 * abs(key[lower + across] - key[upper + across]) <= key[lower + 3 + across]
-        reaches = away + (edge - key[upper + 3 + axis]) / 2 >= -NEAR
-        if touches and abs(gap) <= NEAR and carries and reaches:
-            return True
-    return False
 
 
 @compiled
