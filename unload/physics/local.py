@@ -66,10 +66,10 @@ class LocalPhysics:
     def _pull(
         self, situation: Situation, hopeless: Callable[[float, float, float], bool] | None = None
     ) -> float:
-        """``simulate``, or, if ``hopeless`` is given, a cheaper simulation with the same answer.
+        """``simulate``, or, if ``hopeless`` is given, a cheaper simulation.
 
-        Its distance may differ from that of ``simulate`` by millimetres. What ends closer than
-        ``_CLOSE`` to the threshold is simulated once more, in full.
+        Its distance may differ by millimetres from that of ``simulate``, and its answer hardly ever
+        does. What ends closer than ``_CLOSE`` to the threshold is simulated once more, in full.
 
         Args:
             situation: of the box.

@@ -138,8 +138,9 @@ class TablePhysics(LocalPhysics):
     others on it counts as held down and is not simulated: such situations hardly ever repeat, and
     of those in ``data/lift_agreement.csv`` PyBullet lifts none by more than 4 cm. What the table
     lacks is held down where one or two others lie on or near its middle (see ``held_by_rule``),
-    and simulated elsewhere, in about half of the time that ``LocalPhysics`` takes and with the same
-    answer, though the distance may differ by millimetres. A lift that is certain to fail says 0 m.
+    and simulated elsewhere, in less than half of the time that ``LocalPhysics`` takes: the distance
+    may differ by millimetres, the answer hardly ever does (``data/certain_lifts.csv``). A lift that
+    is certain to fail says 0 m.
 
     Args:
         table: filled by its engine as situations are met. Share one among environments to share
@@ -241,7 +242,8 @@ def held_by_rule(key):
     """Whether what lies on the chosen box, one box or two, holds it down.
 
     In random loads and random stacks of boxes of any proportions, no lift contradicts this
-    (``data/certain_lifts.csv``).
+    (``data/certain_lifts.csv``). A search that climbs from such stacks finds contrived ones that
+    do, such as a plate of 5 cm that stands upright on the edge of a flat box and carries another.
 
     The pull can raise 1.04 boxes besides the chosen one. So with one box on its middle the chosen
     one rises by 9 mm only. With one off its middle it tips aside, unless it stands between others.
