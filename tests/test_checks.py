@@ -140,7 +140,7 @@ def test_runs_that_differ_are_compared_in_a_sentence():
 
 MASKED = "np.where(allowed, scores, -np.inf)"
 BEST = "target(after).masked_fill(~allowed_after, -torch.inf).amax(dim=1)"
-ENDED = "best.masked_fill(ended, 0)"
+ENDED = "best.masked_fill(terminated, 0)"
 MEAN = "np.mean([reward for _, _, reward, *_ in picks])"
 MISTAKES = [  # in ``plain``: what is replaced, by what, and what is said
     ("choose", MASKED, "scores", "ε = 0.0 it chooses an item that the mask excludes"),
@@ -186,7 +186,11 @@ MISTAKES = [  # in ``plain``: what is replaced, by what, and what is said
 SAME = [
     ("choose", "-np.inf", "-2.0"),
     ("choose", ".argmax(axis=1)", ".argmax(axis=1).tolist()"),
-    ("update", f"reward + gamma * {ENDED}", "torch.where(ended, reward, reward + gamma * best)"),
+    (
+        "update",
+        f"reward + gamma * {ENDED}",
+        "torch.where(terminated, reward, reward + gamma * best)",
+    ),
     ("update", "amax(dim=1)", "max(dim=1).values"),
     ("masked_dqn", "np.array(losses), np.array(means)", "losses, means"),
 ]

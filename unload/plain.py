@@ -184,10 +184,10 @@ def choose(network, observations, allowed, epsilon, rng):
 def update(network, target, optimizer, picks, gamma):
     """Bring the values of remembered picks nearer to their targets; return the loss."""
     columns = (torch.from_numpy(np.array(column)) for column in zip(*picks))
-    before, chosen, reward, after, allowed_after, ended = columns  # (batch, ...) each
+    before, chosen, reward, after, allowed_after, terminated = columns  # (batch, ...) each
     with torch.no_grad():
         best = target(after).masked_fill(~allowed_after, -torch.inf).amax(dim=1)
-    goal = reward + gamma * best.masked_fill(ended, 0)  # (batch,); no pick follows the last one
+    goal = reward + gamma * best.masked_fill(terminated, 0)  # (batch,); no pick follows the last
     values = network(before).gather(1, chosen[:, None])[:, 0]  # (batch, 128) -> (batch,)
     loss = smooth_l1_loss(values, goal)  # ()
     optimizer.zero_grad()
@@ -204,7 +204,7 @@ def pick(choose, envs, network, seen, epsilon, mask, rng):
     observations, infos = seen  # (E, 128, 3)
     allowed = infos["action_mask" if mask else "item_mask"].astype(bool)  # (E, 128)
     actions = choose(network, observations, allowed, epsilon, rng)  # (E,)
-    following, rewards, ended, _, infos = envs.step(actions)  # (E, 128, 3), (E,), (E,)
+    following, rewards, terminated, _, infos = envs.step(actions)  # (E, 128, 3), (E,), (E,)
 
     # Where an episode has ended, Gymnasium has begun the next one already. What was seen last in
     # the old one stands in ``final_obs`` and ``final_info``, and belongs to the pick.
@@ -214,7 +214,7 @@ def pick(choose, envs, network, seen, epsilon, mask, rng):
         after[env] = infos["final_obs"][env]
         allowed_after[env] = infos["final_info"]["action_mask"][env]
     rewards = rewards.astype(np.float32)
-    picks = list(zip(observations, actions, rewards, after, allowed_after, ended))
+    picks = list(zip(observations, actions, rewards, after, allowed_after, terminated))
     return picks, (following, infos)
 
 

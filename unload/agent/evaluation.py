@@ -56,8 +56,8 @@ def evaluate(
 ) -> pd.DataFrame:
     """Let a policy unload fresh containers.
 
-    A pick counts as deadlocked if its item has failed before since the last success:
-    the container has not changed, so it fails again (Sec. III-G).
+    A pick counts as deadlocked if its item has failed before since the last success: the container
+    has not changed, so it fails again (Sec. III-G), unless a ``FullPhysics("keep")`` moves boxes.
 
     Args:
         policy: see ``unload.policies``.
@@ -185,12 +185,12 @@ def _play(
 
     # Of each environment, the picks of its own episode, which came first.
     summaries = []
-    for count, reward, failed in zip(picks, np.transpose(rewards), np.transpose(deadlocked)):
-        reward, failed = reward[:count], failed[:count]
+    for count, reward, repeated in zip(picks, np.transpose(rewards), np.transpose(deadlocked)):
+        reward, repeated = reward[:count], repeated[:count]
         # Where a deadlock starts, where it ends, where the next one starts, and so on.
-        changes = np.flatnonzero(np.diff(failed, prepend=0, append=0))
+        changes = np.flatnonzero(np.diff(repeated, prepend=0, append=0))
         longest = (changes[1::2] - changes[::2]).max(initial=0)
-        summaries.append((success_rate(reward), (reward > 0).sum(), failed.mean(), longest))
+        summaries.append((success_rate(reward), (reward > 0).sum(), repeated.mean(), longest))
     frame = pd.DataFrame(
         summaries, columns=["success_rate", "unloaded", "deadlocked", "longest_deadlock"]
     )

@@ -38,8 +38,8 @@ _PACKAGE_COLOURS = (
     "#e07a5f", "#b5838d", "#f2b880", "#8d6a9f", "#d4a373", "#f6e27f",
 )  # fmt: skip
 SEAM = 0.012  # m, boxes are drawn this much smaller so that one sees where they end
-# From outside, over the left edge of the entrance, which is the side of x = 7 m. Those of a
-# container of another size are scaled with it.
+# From outside, over the left edge of the entrance, which is the side of x = 7 m. ``project`` scales
+# those of a container of another size with it.
 EYE = np.array([11.6, -2.9, 4.4])  # m
 TARGET = np.array([4.4, 1.1, 0.9])  # m
 CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)])

@@ -171,7 +171,7 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         Where an episode ends, the next one begins by ``autoreset_mode``:
 
             SAME_STEP  at once; ``infos["final_obs"]`` and ``["final_info"]`` hold the last ones
-            NEXT_STEP  in the next step, whose action is not used there, and whose reward is 0
+            NEXT_STEP  in the next step, whose action does not count there, and whose reward is 0
             DISABLED   by the caller's ``reset(options={"reset_mask": mask})``, before another step
 
         Where it begins in this step, the observation and infos are the reset's.

@@ -29,7 +29,8 @@ class ContainerEnv(PickingEnv):
     A container of 7.0 × 2.5 × 2.5 m holds 800–1000 boxes, stacked in walls. At each step
     the agent chooses one of the 128 boxes nearest to the entrance. It is pulled upwards
     with 20 N for 0.3 s; if it moved at least 0.2 m it is unloaded, else the container
-    stays as it was. With ``max_picks`` large enough, it is unloaded to the last box.
+    stays as it was (``FullPhysics("keep")`` excepted). With ``max_picks`` large enough, it is
+    unloaded to the last box.
 
     ## Action space
     ``Discrete(128)``: the row of the observation to pick. A row that failed before may be
@@ -86,8 +87,8 @@ class ContainerEnv(PickingEnv):
             - ``"local"``: the situation of the chosen box. It is the default here, because each
               distance is the engine's own then;
             - ``"table"``: ``"local"``, remembered. It answers without a simulation if nothing rests
-              on the chosen box (it moves by 0.463053 m), if three boxes or more do, or one or two
-              on its middle (0 m);
+              on the chosen box (it moves by 0.463053 m), if three boxes or more do, and, in loads
+              that it has not met, if a rule says that one or two hold it down (0 m);
             - ``"places"``: nothing. Whatever has a box on it is held down, which errs where
               PyBullet tips it off: in notebook 22 for 0 to 1 % of such boxes;
             - ``"full"``: every box, which takes seconds a pick.

@@ -48,6 +48,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         self._how_observed = self.equalize, self.ties == "average"
         self.stack = stack
         self.physics: Any = make_physics(physics)
+        # What is in its arrays, ``fast.containers.Containers`` says.
         self._containers = containers.allocate(self.num_envs, 0, 0)
         # Of each container: its load, and where all items of it are seen to be, (n, 3) in m. No
         # step of this class needs them, so that no checkpoint keeps them; a single environment
@@ -105,7 +106,14 @@ class ContainerVectorEnv(PickingVectorEnv):
         check_no_overhang(load)
 
     def _show(self, env: int, items: np.ndarray, positions: np.ndarray, load: Load) -> None:
-        """Show the items that are left, (k,) int64, where all are seen to be, (n, 3) in m."""
+        """Show the nearest of the items that are left.
+
+        Args:
+            env: which container.
+            items: (k,) int64, those that are left.
+            positions: (n, 3) float64, where all items of the load are seen to be, in m.
+            load: of the container.
+        """
         state = self._containers
         self._loads[env], self._seen_at[env] = load, positions
         order = observation.nearest(positions[items], len(items), load.container)

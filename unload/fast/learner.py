@@ -18,7 +18,8 @@ class FusedLearner:
 
     Its update reads the rows where they are, which saves copying them, and goes on in other
     threads while the caller does something else. tanh is computed in double precision, where its
-    slope vanishes later; actions are compared by the value before tanh, which has no ties.
+    slope vanishes later; actions are compared by the value before tanh, which makes large ones
+    equal.
     ``torch.optim.Adam`` spends most of its time on everything but the few hundred weights of the
     paper's network; its rule is one compiled pass here.
     """

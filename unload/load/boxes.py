@@ -247,7 +247,8 @@ def check_no_overhang(load: Load) -> None:
             below += others[~rests[others]].tolist()
             rests[others] = True
         shared = np.minimum(high[box], high) - np.maximum(low[box], low)
-        # What shares less than a contact's tolerance with it is not pulled into it, see ``GAP``.
+        # What shares less than a contact's tolerance with it is not pulled into it, because physics
+        # makes boxes narrower (``bullet.GAP``).
         under = (shared[:, :2] > CONTACT_TOLERANCE).all(axis=1) & (
             load.positions[:, 2] < load.positions[box, 2]
         )

@@ -49,7 +49,7 @@ def read_weights(path: str | Path, kind: str, make: Callable[[dict, dict], Made]
 
     Raises:
         FileNotFoundError: there is no such file.
-        ValueError: the file is damaged, of another kind, or not of this version.
+        ValueError: the file is damaged, of another kind, or ``make`` cannot use it.
     """
     path = checks.path("path", path)
     if not path.is_file():

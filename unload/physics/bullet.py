@@ -91,8 +91,8 @@ SETTINGS = {
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # orientation of a box that is not turned
 ITERATIONS = 50
-# A pull is asked whether it is hopeless every so many s: 8 of its 72 steps tell half of those that
-# fail.
+# Every so many s a pull that may be given up is judged, see ``table.hopeless``: after 8 of its 72
+# steps half of those that fail are given up.
 ASKED_EVERY = 8 * TIME_STEP
 
 
@@ -132,7 +132,8 @@ class World:
     Attributes:
         client: see ``Client``.
         bodies: how many have been created since the world was new or cleared. PyBullet keeps 1 KB
-            of each after it is removed, and 4 KB of each size.
+            of each after it is removed, and 4 KB of each shape.
+        iterations: of the next steps; may be set.
 
     Args:
         time_step: s per ``stepSimulation``.

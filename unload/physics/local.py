@@ -69,7 +69,8 @@ class LocalPhysics:
         """``simulate``, or, if ``hopeless`` is given, a cheaper simulation.
 
         Its distance may differ by millimetres from that of ``simulate``, and its answer hardly ever
-        does. What ends closer than ``_CLOSE`` to the threshold is simulated once more, in full.
+        does. What ends closer than ``_CLOSE`` to the threshold is simulated once more, in full. By
+        MuJoCo it is the same simulation, which may only end early.
 
         Args:
             situation: of the box.

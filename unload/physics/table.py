@@ -4,8 +4,8 @@ A lift depends on its situation alone, so a table of lifts says how far the box 
 moved. The table is only as good as the physics that filled it: a file of another physics is
 refused. Where physics leaves no doubt, rules answer instead: a box with nothing on top is free, one
 with three or more others on top is held down, and so is one under one or two others that press on
-its middle, or near it if it stands between others. What is simulated is given up where it has
-become hopeless.
+its middle, or anywhere across it if it stands between others. What is simulated is given up where
+it has become hopeless.
 """
 
 import json
