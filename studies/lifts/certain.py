@@ -4,12 +4,13 @@
 
 A box with others on it is held down for certain, or simulated: ``TablePhysics`` decides which. The
 bounds of its rules (``table.MIDDLE`` and those below it) were chosen on the lifts of one part and
-thousands like them. All others were drawn anew: a second part like the first, a third of the answer
-that is rare, and a fourth of lifts that no rule answers. Both engines lift each box to the end, and
-what an empty table says by each stands beside it.
+thousands like them. All others were drawn after that: a second part like the first, a third of the
+answer that is rare, and a fourth of lifts that no rule answers. Both engines lift each box to the
+end, and what an empty table says by each stands beside it.
 """
 
 from collections.abc import Iterator
+from itertools import islice
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -32,8 +33,8 @@ from unload.physics.table import HELD_DOWN, MIDDLE, LiftTable, TablePhysics, hel
 NAME = "certain_lifts"
 # First seed of a part, and how many lifts of each family; no other data uses these seeds.
 PARTS = {
-    "bounds": (1_100_000, 100), "drawn anew": (1_500_000, 600), "rare": (1_900_000, 150),
-    "simulated": (2_300_000, 1_000),
+    "bounds": (1_100_000, 100), "drawn anew": (8_100_000, 600), "rare": (8_500_000, 150),
+    "simulated": (8_900_000, 1_000),
 }  # fmt: skip
 PER_LOAD = 25  # lifts of a load, at most
 ASKED = 0.2  # share of the failing picks that are asked about
@@ -45,13 +46,13 @@ ONLY = {
     "simulated": (("bricked walls", "crossed layers", *STACKS), "given up early"),
 }
 EDGES = (0.05, 1.5)  # m, of boxes of these stacks
-MAX_OFFSET = 1.2  # half edges, their common centre
+MAX_OFFSET = 1.2  # half edges, the mean of their centres along x and along y
 COLUMNS = [
-    "part", "family", "on_top", "common", "farthest", "answer", *ENGINES,
+    "part", "family", "on_top", "farthest", "answer", *ENGINES,
     *(f"table_{engine}" for engine in ENGINES),
 ]  # fmt: skip
 COLOURS = dict(zip((*FAMILIES, *STACKS), ("C0", "C1", "C2", "C3", "C4", "#e377c2")))
-BOUNDS = ("middle", "covered", "flat", "hardly")  # see ``physics.table``
+BOUNDS = ("middle", "smallest", "covered", "flat", "hardly")  # see ``physics.table``
 ANSWERS = (
     "three or more on top", "on its middle", "between others", "given up early",
     "simulated to the end",
@@ -61,10 +62,10 @@ ANSWERS = (
 def certain_data() -> None:
     """Ask about all lifts of all parts: ``certain_lifts.csv``, a row each.
 
-    ``on_top`` is the number of boxes on the chosen one. ``common`` says how far their common centre
-    is from its centre, in half edges, the larger of x and y; ``farthest`` the same of the one that
-    is farthest. ``answer`` is how the table answers, by PyBullet. Then follow how far each engine
-    moves the box in m, if it lifts it to the end, and what a table by each engine says.
+    ``on_top`` is the number of boxes on the chosen one. ``farthest`` says how far the centre of the
+    farthest of them is from its middle, in half edges. ``answer`` is how the table answers, by
+    PyBullet. Then follow how far each engine moves the box in m, if it lifts it to the end, and
+    what a table by each engine says. No situation is asked about twice.
     """
     lifts = measured(ask_all)
     settings = {engine: settings_of_lifts(engine) for engine in ENGINES}
@@ -79,26 +80,22 @@ def ask_all() -> pd.DataFrame:
     """The rows of ``certain_lifts.csv``."""
     exact = {engine: LocalPhysics(engine) for engine in ENGINES}
     tables = {f"table_{engine}": TablePhysics(LiftTable(engine)) for engine in ENGINES}
-    rows = []
+    rows, seen = [], set()
     for part, (seed, lifts) in PARTS.items():
         families, answer = ONLY.get(part, ((*FAMILIES, *STACKS), None))
         for family in families:
             asked = _stacks(family, seed) if family in STACKS else _blocked(family, seed)
+            asked = (each for each in asked if each.key not in seen)
             if answer is not None:
                 asked = (each for each in asked if _answer(each, 0.0) == answer)
-            for _, situation in zip(range(lifts), asked):
+            for situation in islice(asked, lifts):
+                seen.add(situation.key)
                 said = {name: each.simulate(situation) for name, each in (exact | tables).items()}
                 row = {"part": part, "family": family, "on_top": situation.on_top, **said}
-                row |= dict(zip(("common", "farthest"), offsets(situation)))
+                row["farthest"] = np.hypot(*_centres(situation).T).max()
                 row["answer"] = _answer(situation, row["table_pybullet"])
                 rows.append(row)
     return pd.DataFrame(rows)[COLUMNS]
-
-
-def offsets(situation: Situation) -> tuple[float, float]:
-    """How far the common centre of the boxes on top, and the farthest, is from the middle."""
-    centres = situation.boxes[1 : situation.dynamic, :2] / (situation.boxes[0, 3:5] / 2)
-    return np.abs(centres.mean(axis=0)).max(), np.abs(centres).max()
 
 
 def by_answer(frame: pd.DataFrame) -> pd.DataFrame:
@@ -139,10 +136,10 @@ def over_middle(frame: pd.DataFrame) -> Figure:
             for some, face in ((group[ruled], colour), (group[~ruled], "none")):
                 dots = {"s": 14, "edgecolor": colour, "facecolor": face, "linewidth": 0.7}
                 label = family if face == "none" else None
-                axes.scatter(some["common"], some[ENGINES[0]], label=label, **dots)
+                axes.scatter(some["farthest"], some[ENGINES[0]], label=label, **dots)
         axes.axvspan(0, MIDDLE, color="0.93", zorder=0)
         axes.axhline(task.LIFT_THRESHOLD, color="C5", ls="--", lw=1, label="threshold")
-        axes.set(xlim=(0, MAX_OFFSET), xlabel="common centre off the middle (half edges)")
+        axes.set(xlim=(0, 2), xlabel="farthest centre off the middle (half edges)")
         axes.set_title("one box on top" if on_top == 1 else f"{on_top} boxes on top", fontsize=9)
     panels[0].set_ylabel("distance moved (m)")
     panels[0].legend(fontsize=7, labelspacing=0.25)
@@ -154,8 +151,13 @@ def _answer(situation: Situation, distance: float) -> str:
     if situation.on_top >= HELD_DOWN:
         return ANSWERS[0]
     if held_by_rule(np.frombuffer(situation.key, np.int32)):
-        return ANSWERS[1 if offsets(situation)[0] <= MIDDLE else 2]
+        return ANSWERS[1 if np.hypot(*_centres(situation).T).max() <= MIDDLE else 2]
     return ANSWERS[4] if distance else ANSWERS[3]
+
+
+def _centres(situation: Situation) -> np.ndarray:
+    """The centres of the boxes on top, (n, 2): 0 is the middle of the chosen one, 1 its edge."""
+    return situation.boxes[1 : situation.dynamic, :2] / (situation.boxes[0, 3:5] / 2)
 
 
 def _blocked(family: str, seed: int) -> Iterator[Situation]:
@@ -204,7 +206,7 @@ def _stacks(kind: str, seed: int) -> Iterator[Situation]:
         made = Situation(np.rint(boxes * 1e6).astype(np.int32), dynamic, floor, ())
         apart = np.abs(boxes[:, None, :3] - boxes[:, :3]) - (boxes[:, None, 3:] + boxes[:, 3:]) / 2
         overlaps = (apart < -1e-9).all(axis=-1).sum() > len(boxes)  # each with itself
-        if not overlaps and offsets(made)[0] <= MAX_OFFSET:
+        if not overlaps and np.abs(_centres(made).mean(axis=0)).max() <= MAX_OFFSET:
             yield made
 
 

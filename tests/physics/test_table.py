@@ -53,12 +53,14 @@ def pile(*centres: tuple[float, float], floor: int | None = None, sides=()) -> S
 @pytest.mark.parametrize(
     ("centres", "held"),
     [
-        ([(0.44, -0.44)], True),
+        ([(0.31, -0.31)], True),
+        ([(0.33, -0.33)], False),
+        ([(0.44, 0)], True),
         ([(0.46, 0)], False),
         ([(0, -0.46)], False),
-        ([(0.99, 0), (-0.6, 0.7)], True),
-        ([(1.01, 0), (-0.6, 0)], False),
-        ([(0.5, 0.96), (-0.5, -0.05)], False),
+        ([(0.44, 0), (-0.3, 0.3)], True),
+        ([(0.46, 0), (-0.3, 0)], False),
+        ([(-0.3, 0), (0, 0.46)], False),
     ],
     ids=str,
 )
@@ -97,7 +99,7 @@ LEFT, RIGHT = (0, -2, 0), (0, 2, 0)
         (between(LEFT, RIGHT, centres=[(0, 0.45), (0, 0.99)]), True),
         (between(LEFT, centres=[(0, 0.45), (0, 0.99)], sides=(SIDE // 2,)), True),
         (between(LEFT, centres=[(0, 0.45), (0, 1.01)], sides=(SIDE // 2,)), False),
-        (between(LEFT, RIGHT, centres=[(0.6, 0.9), (0.6, 0.9)]), False),
+        (between(LEFT, RIGHT, centres=[(0.6, 0.9), (-0.6, 0.9)]), False),
         (between(LEFT), False),
         (between(), False),
         (between(LEFT, sides=(SIDE // 2,)), True),
@@ -114,6 +116,14 @@ LEFT, RIGHT = (0, -2, 0), (0, 2, 0)
 )
 def test_between_others_a_box_is_held_wherever_the_load_is_above_it(situation, held):
     assert held_by_rule(np.frombuffer(situation.key, np.int32)) == held
+
+
+@pytest.mark.parametrize(("edge", "held"), [(150_000, True), (149_999, False)])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_small_box_is_not_held_down_for_certain(axis, edge, held):
+    small = pile((0.0, 0.0))
+    small.boxes[0, 3 + axis] = edge
+    assert held_by_rule(np.frombuffer(small.key, np.int32)) == held
 
 
 @pytest.mark.parametrize(("height", "held"), [(0.25, True), (0.24, False)])

@@ -28,13 +28,14 @@ PhysicsName = Literal["local", "places", "table"]
 
 UNKNOWN = -1  # in place of a distance that is not in the table
 HELD_DOWN = 3  # so many boxes on top hold a box down
-# One or two boxes on top hold the chosen box down, too, if their centres lie above it, and the mean
-# of these near its middle: within ±MIDDLE along x and y, where 0 is its centre and 1 its edge.
+# One or two boxes on top hold the chosen box down, too, if the centre of each lies near its middle:
+# within a circle of this radius, where 0 is the middle, and 1 the edge along x and along y.
 MIDDLE = 0.45
-# A box that stands between others cannot tip sideways. So along y the mean may lie anywhere from
-# edge to edge. A box counts as between others if they cover at least this share of its left and of
-# its right face, and if it is at most so many times as wide as high: a flatter one tips within the
-# gaps.
+SMALLEST = 150_000  # µm, an edge of such a box along x or y: a smaller one tips in less time
+# A box that stands between others cannot tip sideways. So along y a centre may lie anywhere from
+# edge to edge, if it is no farther from the middle than MIDDLE along x. A box counts as between
+# others if they cover at least this share of its left and of its right face, and if it is at most
+# so many times as wide as high: a flatter one tips within the gaps.
 COVERED = 0.5
 FLAT = 4.0
 NEAR = CONTACT_TOLERANCE / RESOLUTION  # micrometres between faces that touch, at most
@@ -242,42 +243,25 @@ def held_by_rule(key):
     """Whether what lies on the chosen box, one box or two, holds it down.
 
     In random loads and random stacks of boxes of any proportions, no lift contradicts this
-    (``data/certain_lifts.csv``). A search that climbs from such stacks finds contrived ones that
-    do, such as a plate of 5 cm that stands upright on the edge of a flat box and carries another.
+    (``data/certain_lifts.csv``), nor did a search that climbs from such stacks.
 
     The pull can raise 1.04 boxes besides the chosen one. So with one box on its middle the chosen
     one rises by 9 mm only. With one off its middle it tips aside, unless it stands between others.
-    See ``MIDDLE`` and ``COVERED``.
+    See ``MIDDLE``, ``SMALLEST`` and ``COVERED``.
 
     Args:
         key: the words of a situation's key, see ``Situation.key``.
     """
     _, first = parts_of_key(key)
-    if key[0] - 1 >= HELD_DOWN or not _presses_within(key, first, MIDDLE, 1.0):
+    width, depth = key[first + 4], key[first + 3]
+    if key[0] - 1 >= HELD_DOWN or min(width, depth) < SMALLEST:
         return False
-    return _presses_within(key, first, MIDDLE, MIDDLE) or _between_others(key, first)
-
-
-@compiled
-def _presses_within(key, first, along_x, along_y):
-    """Whether the centres on top lie above the chosen box, and on average so near its centre.
-
-    Args:
-        key: the words of a situation's key.
-        first: the index in it where the boxes begin, with the chosen one.
-        along_x, along_y: how far out that may be, as for ``MIDDLE``.
-    """
-    on_top = key[0] - 1
-    for axis, middle in enumerate((along_x, along_y)):
-        edge, total = key[first + 3 + axis], 0.0
-        for box in range(1, on_top + 1):
-            centre = key[first + 6 * box + axis]
-            if 2 * abs(centre) > edge:
-                return False
-            total += centre
-        if 2 * abs(total) > middle * on_top * edge:
-            return False
-    return True
+    middle = across = True  # whether all centres lie near the middle, or near the line across it
+    for box in range(first + 6, first + 6 * key[0], 6):
+        x, y = 2 * key[box] / depth, 2 * key[box + 1] / width
+        middle &= x * x + y * y <= MIDDLE**2
+        across &= abs(x) <= MIDDLE and abs(y) <= 1
+    return middle or (across and _between_others(key, first))
 
 
 @compiled
