@@ -140,8 +140,8 @@ class TablePhysics(LocalPhysics):
     of those in ``data/lift_agreement.csv`` PyBullet lifts none by more than 4 cm. What the table
     lacks is held down where one or two others lie on or near its middle (see ``held_by_rule``),
     and simulated elsewhere, in less than half of the time that ``LocalPhysics`` takes: the distance
-    may differ by millimetres, the answer hardly ever does (``data/certain_lifts.csv``). A lift that
-    is certain to fail says 0 m.
+    differs by millimetres, rarely by centimetres, and the answer hardly ever
+    (``data/certain_lifts.csv``). A lift that is certain to fail says 0 m.
 
     Args:
         table: filled by its engine as situations are met. Share one among environments to share
