@@ -22,8 +22,8 @@ from unload.physics.situation import RESOLUTION, Situation, Surroundings
 
 _MOST_BODIES = 10_000  # made in a world, before what PyBullet keeps of them is cleared away
 _TIMES_ASKED = 6  # whether a pull is hopeless: until a third of its time is left
-# m. What ends so close to the threshold is simulated in full, because most answers of the cheaper
-# simulation that would be wrong lie there.
+# m. What ends so close to the threshold is simulated in full: most of the wrong answers that the
+# cheaper simulation would give lie there.
 _CLOSE = 0.01
 
 
@@ -132,7 +132,8 @@ class LocalPhysics:
             if quick and fixed:
                 bodies.append(world.add_fixed(fixed))
             else:
-                bodies += [world.add_box(place, size, 0.0) for place, size in fixed]
+                for place, size in fixed:
+                    bodies.append(world.add_box(place, size, 0.0))
             yield world, bodies[0]
         finally:  # also when interrupted: what stays behind would be in the way of the next lift
             for body in reversed(bodies):
