@@ -92,7 +92,7 @@ def ask_all() -> pd.DataFrame:
                 seen.add(situation.key)
                 said = {name: each.simulate(situation) for name, each in (exact | tables).items()}
                 row = {"part": part, "family": family, "on_top": situation.on_top, **said}
-                row["farthest"] = np.hypot(*_centres(situation).T).max()
+                row["farthest"] = _farthest(situation)
                 row["answer"] = _answer(situation, row["table_pybullet"])
                 rows.append(row)
     return pd.DataFrame(rows)[COLUMNS]
@@ -151,13 +151,18 @@ def _answer(situation: Situation, distance: float) -> str:
     if situation.on_top >= HELD_DOWN:
         return ANSWERS[0]
     if held_by_rule(np.frombuffer(situation.key, np.int32)):
-        return ANSWERS[1 if np.hypot(*_centres(situation).T).max() <= MIDDLE else 2]
+        return ANSWERS[1 if _farthest(situation) <= MIDDLE else 2]
     return ANSWERS[4] if distance else ANSWERS[3]
 
 
 def _centres(situation: Situation) -> np.ndarray:
     """The centres of the boxes on top, (n, 2): 0 is the middle of the chosen one, 1 its edge."""
     return situation.boxes[1 : situation.dynamic, :2] / (situation.boxes[0, 3:5] / 2)
+
+
+def _farthest(situation: Situation) -> float:
+    """How far the farthest of these centres is from the middle, in half edges."""
+    return np.hypot(*_centres(situation).T).max()
 
 
 def _blocked(family: str, seed: int) -> Iterator[Situation]:

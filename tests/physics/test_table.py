@@ -99,6 +99,7 @@ LEFT, RIGHT = (0, -2, 0), (0, 2, 0)
         (between(LEFT, RIGHT, centres=[(0, 0.45), (0, 0.99)]), True),
         (between(LEFT, centres=[(0, 0.45), (0, 0.99)], sides=(SIDE // 2,)), True),
         (between(LEFT, centres=[(0, 0.45), (0, 1.01)], sides=(SIDE // 2,)), False),
+        (between(LEFT, RIGHT, centres=[(0.6, 0.9), (0.6, 0.9)]), False),
         (between(LEFT, RIGHT, centres=[(0.6, 0.9), (-0.6, 0.9)]), False),
         (between(LEFT), False),
         (between(), False),
